@@ -1,0 +1,1 @@
+"""Farfield over HTTP."""

@@ -1,0 +1,151 @@
+"""The prepared scene: render-ready geometry in plain arrays that many processes map at once.
+
+A folder `prepared/` holds
+
+    scene.json       bounds, counts, batches, blocks, textures (the models below)
+    positions.npy    (n, 3) float32, metres, relative to `origin`
+    normals.npy      (n, 4) int8, unit normals times 127, last component 0
+    uvs.npy          (n, 2) float32, glTF texture coordinates (v runs down the image)
+    colors.npy       (n, 4) uint16, linear base colour factor times vertex colour, times 65535
+    triangles.npy    (m, 3) uint32, indices into the vertices
+    textures/<name>  PNG files, sRGB, straight alpha
+    map.png, thumbnail.png
+
+Triangles are sorted by block, inside a block by batch, inside a batch along a space-filling curve;
+each block is a contiguous range and owns its vertices. Front faces wind counter-clockwise and agree
+with the stored normals. scene.json is written last: a scene is ready when it exists.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from farfield_core.errors import NotFoundError
+
+VERSION: Literal[1] = 1
+
+Triple = tuple[float, float, float]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Texture(_Model):
+    """One image of the scene."""
+
+    file: str
+    width: int
+    height: int
+    wrap_u: Literal["repeat", "clamp", "mirror"] = "repeat"
+    wrap_v: Literal["repeat", "clamp", "mirror"] = "repeat"
+    filter: Literal["linear", "nearest"] = "linear"
+
+
+class Batch(_Model):
+    """Triangles that draw with the same state; base colour factors live in the vertex colours.
+
+    `alpha` says how opacity is decided: "opaque" ignores it, "mask" draws where it reaches
+    `cutoff`, "dither" screens it (glTF's BLEND where the opacity is even, such as glass). BLEND
+    with a varying opacity, such as foliage, becomes "mask" at half the greatest opacity.
+    """
+
+    texture: int | None = None
+    emissive: Triple = (0.0, 0.0, 0.0)
+    emissive_texture: int | None = None
+    alpha: Literal["opaque", "mask", "dither"] = "opaque"
+    cutoff: float = 0.5
+    double_sided: bool = False
+    unlit: bool = False
+
+
+class Part(_Model):
+    """The triangles of one batch inside one block."""
+
+    batch: int
+    first_triangle: int
+    triangles: int
+
+
+class Block(_Model):
+    """A spatial chunk of triangles; its bounds are relative to the scene's origin."""
+
+    low: Triple
+    high: Triple
+    first_vertex: int
+    vertices: int
+    parts: tuple[Part, ...]
+
+    @property
+    def first_triangle(self) -> int:
+        """First triangle of the block."""
+        return self.parts[0].first_triangle
+
+    @property
+    def triangles(self) -> int:
+        """Number of triangles in the block."""
+        return sum(part.triangles for part in self.parts)
+
+
+class Bounds(_Model):
+    """An axis-aligned box in scene coordinates."""
+
+    min: Triple
+    max: Triple
+
+
+class SceneInfo(_Model):
+    """scene.json."""
+
+    version: Literal[1] = VERSION
+    id: str
+    name: str
+    bounds: Bounds
+    origin: Triple
+    triangles: int
+    vertices: int
+    textures: tuple[Texture, ...]
+    batches: tuple[Batch, ...]
+    blocks: tuple[Block, ...]
+    #: what was left out or guessed while reading, a sentence each
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class PreparedScene:
+    """A prepared scene, its arrays mapped from disk (shapes in the module's docstring)."""
+
+    folder: Path
+    info: SceneInfo
+    positions: NDArray[np.float32]
+    normals: NDArray[np.int8]
+    uvs: NDArray[np.float32]
+    colors: NDArray[np.uint16]
+    triangles: NDArray[np.uint32]
+
+    @property
+    def origin(self) -> NDArray[np.float64]:
+        """Where the arrays' zero lies in scene coordinates, (3,) float."""
+        return np.asarray(self.info.origin, np.float64)
+
+
+ARRAYS = ("positions", "normals", "uvs", "colors", "triangles")
+
+
+def open_scene(folder: Path) -> PreparedScene:
+    """Map the prepared scene in `folder`; raises NotFoundError if it is not (yet) there."""
+    try:
+        text = (folder / "scene.json").read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise NotFoundError(f"There is no prepared scene in {folder}; prepare it first.") from None
+    info = SceneInfo.model_validate_json(text)
+    arrays: dict[str, Any] = {
+        name: np.load(folder / f"{name}.npy", mmap_mode="r") for name in ARRAYS
+    }
+    return PreparedScene(folder, info, **arrays)

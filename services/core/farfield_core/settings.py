@@ -1,0 +1,78 @@
+"""The settings of a bake: one model for the command line, REST and walk.json."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from farfield_core import placement
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class BakeSettings(BaseModel):
+    """What a bake may be asked for; REST names are the options with underscores."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    quads: Literal["layers"] = "layers"
+    #: edge lengths of a view cell, metres; one number means a cube
+    cell_size: tuple[Positive, Positive, Positive] = (10.0, 10.0, 10.0)
+    layers: int = Field(default=64, ge=1, le=4096)
+    #: wanted half width of the near field, metres; chooses the number of layers
+    near: Positive | None = None
+    #: parallax bound, radians; null means the central pixel of a 60 degree image
+    alpha: Annotated[float, Field(gt=0, lt=0.7853)] | None = None
+    #: how many texels two neighbouring layers may shift by; null means no bound
+    gap_texels: Positive | None = 1.0
+    resolution: int = Field(default=512, ge=16, le=4096)
+    faces: Literal["auto", "sides", "all"] = "auto"
+    grower: Literal["greedy", "best"] = "best"
+    visibility: Literal["on", "off"] = "on"
+    encoder: Literal["png", "webp"] = "png"
+    supersample: int = Field(default=1, ge=1, le=4)
+    renderer: Literal["moderngl", "pyrender"] = "moderngl"
+
+    @field_validator("cell_size", mode="before")
+    @classmethod
+    def _one_number_is_a_cube(cls, value: object) -> object:
+        return (value, value, value) if isinstance(value, int | float) else value
+
+    @model_validator(mode="after")
+    def _near_outside_cell(self) -> BakeSettings:
+        if self.near is not None and self.near <= max(self.cell_size) / 2:
+            raise ValueError(
+                f"near {self.near:g} lies inside the cell; "
+                f"use more than {max(self.cell_size) / 2:g}"
+            )
+        return self
+
+    @property
+    def half_extents(self) -> tuple[float, float, float]:
+        """Half the cell's edge lengths, metres."""
+        x, y, z = self.cell_size
+        return (x / 2, y / 2, z / 2)
+
+    @property
+    def parallax(self) -> float:
+        """The parallax bound in force, radians."""
+        return placement.default_alpha(self.resolution) if self.alpha is None else self.alpha
+
+    def place(self) -> placement.Placement:
+        """Layers and borders of every cell under these settings."""
+        count = self.layers
+        if self.near is not None:
+            count = placement.layers_for_near(
+                self.near, self.half_extents, self.resolution, self.alpha, self.gap_texels
+            )
+        return placement.place(
+            self.half_extents, self.resolution, count, self.alpha, self.gap_texels
+        )
+
+    def key(self) -> str:
+        """Hash of the settings that change what a bake contains."""
+        text = json.dumps(self.model_dump(mode="json"), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
