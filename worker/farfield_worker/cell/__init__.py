@@ -1,0 +1,1 @@
+"""One view cell, from scene to files."""

@@ -1,0 +1,1 @@
+"""From texels to quads and atlases (LEMI section 5)."""

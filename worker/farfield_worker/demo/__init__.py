@@ -1,0 +1,1 @@
+"""The demo scene, written by our own code."""

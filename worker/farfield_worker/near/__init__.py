@@ -1,0 +1,1 @@
+"""The near field: blocks of polygons shared by cells."""
