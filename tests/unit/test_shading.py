@@ -51,11 +51,13 @@ def unit_vectors(rng: np.random.Generator) -> np.ndarray:
 def test_shade(context: moderngl.Context) -> None:
     rng = np.random.default_rng(1)
     n, base, emissive = unit_vectors(rng), rng.random((COUNT, 3)), 0.3 * rng.random((COUNT, 3))
-    lit = evaluate(context, "ff_shade(base, n, emissive, 0.0)", base=base, n=n, emissive=emissive)
-    light = shading.default_light()
-    np.testing.assert_allclose(lit, shading.shade(light, base, n, emissive), atol=2e-6)
-    flat = evaluate(context, "ff_shade(base, n, emissive, 1.0)", base=base, n=n, emissive=emissive)
-    np.testing.assert_allclose(flat, base, atol=2e-6)
+    flag = np.arange(COUNT)[:, None] % 2
+    out = evaluate(
+        context, "ff_shade(base, n, emissive, flag)", base=base, n=n, emissive=emissive, flag=flag
+    )
+    lit = shading.shade(shading.default_light(), base, n, emissive)
+    flat = shading.shade(shading.default_light(), base, n, emissive, unlit=True)
+    np.testing.assert_allclose(out, np.where(flag == 0, lit, flat), atol=2e-6)
 
 
 def test_transfer_function(context: moderngl.Context) -> None:
