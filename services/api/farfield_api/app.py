@@ -7,6 +7,10 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from threading import Thread
 
+from farfield_core.dispatch import Dispatcher, Listener
+from farfield_core.dispatch.local import LocalDispatcher
+from farfield_core.dispatch.prepare import ScenePreparer
+from farfield_core.store import Store
 from fastapi import FastAPI
 from fastapi.middleware.gzip import GZipMiddleware
 from fastapi.routing import APIRoute
@@ -15,10 +19,6 @@ from farfield_api import __version__, exceptions, pages
 from farfield_api.routers import bakes, events, health, plans, scenes, uploads, walks
 from farfield_api.service import FarfieldService
 from farfield_api.settings import ApiSettings
-from farfield_core.dispatch import Dispatcher, Listener
-from farfield_core.dispatch.local import LocalDispatcher
-from farfield_core.dispatch.prepare import ScenePreparer
-from farfield_core.store import Store
 
 PREFIX = "/api/v1"
 
@@ -31,7 +31,7 @@ def create_service(settings: ApiSettings) -> FarfieldService:
     store = Store.open(settings.store)
     if settings.broker:
         # imported here, because a server without a farm needs no Celery
-        from farfield_core.dispatch.farm import CeleryDispatcher, CeleryPreparer  # noqa: PLC0415
+        from farfield_core.dispatch.celery import CeleryDispatcher, CeleryPreparer  # noqa: PLC0415
 
         def farm(listener: Listener) -> Dispatcher:
             return CeleryDispatcher(store, settings.broker, listener)

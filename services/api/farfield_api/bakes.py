@@ -15,16 +15,16 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
-
-from farfield_api.exceptions import NotNowError
 from farfield_core.bake import done_cells, read_walk
 from farfield_core.cells import CellGrid, Index, cell_name
-from farfield_core.control import Control, forget_failures, read_control, write_control
+from farfield_core.control import Control, read_control, write_control
 from farfield_core.dispatch import BakeStatus, Dispatcher, Event, Listener
 from farfield_core.errors import FarfieldError
 from farfield_core.store import Store
 from farfield_core.tables import walk_grid
 from farfield_core.walk import Walk
+
+from farfield_api.exceptions import NotNowError
 
 log = logging.getLogger(__name__)
 
@@ -120,10 +120,7 @@ class Bakes:
     def progress(self, bake: str) -> Progress:
         """Where a bake stands; raises NotFoundError."""
         walk = self._walk(bake)
-        if self._runs_here(bake):
-            status = self._dispatcher.status(bake)
-        else:
-            status = self._watched(walk)
+        status = self._dispatcher.status(bake) if self._runs_here(bake) else self._watched(walk)
         return Progress(walk, status, self._rate(bake))
 
     def pause(self, bake: str) -> None:
@@ -154,7 +151,6 @@ class Bakes:
         status = self.progress(bake).status
         if not status.failed and status.state != "failed":
             raise NotNowError(f"No cell of bake {bake} has failed; there is nothing to retry.")
-        forget_failures(self._store, bake)
         write_control(self._store, bake, "running")
         if self._runs_here(bake):
             self._dispatcher.retry(bake)

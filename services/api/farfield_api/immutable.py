@@ -6,10 +6,9 @@ import hashlib
 import mimetypes
 from pathlib import Path
 
+from farfield_core.store import Store
 from fastapi import Request
 from fastapi.responses import FileResponse, Response
-
-from farfield_core.store import Store
 
 FOREVER = "public, max-age=31536000, immutable"
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from fastapi import FastAPI
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import HTMLResponse
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
+from starlette.routing import Match, Mount
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
@@ -22,18 +24,30 @@ class Pages(StaticFiles):
     """One page for every address a browser may open, beside the files it is built of."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
+        """Answer with a file, or for addresses such as /walk/<id> with the page that knows them."""
         try:
             response = await super().get_response(path, scope)
         except HTTPException as error:
-            # Addresses such as /walk/<id> are routes inside the page; files have a suffix.
-            if error.status_code != 404 or path.startswith("api") or "." in path.split("/")[-1]:
+            if error.status_code != 404 or "." in path.rpartition("/")[2]:
                 raise
-            response = await super().get_response("index.html", scope)
+            own = f"{path.partition('/')[0]}/index.html"
+            known = await run_in_threadpool(self.lookup_path, own)
+            response = await super().get_response(own if known[1] else "index.html", scope)
         hashed = path.startswith("assets/") and response.status_code in (200, 206, 304)
         response.headers["Cache-Control"] = (
             "public, max-age=31536000, immutable" if hashed else "no-cache"
         )
         return response
+
+
+class PagesMount(Mount):
+    """Everything outside the API, which answers for its own addresses and methods."""
+
+    def matches(self, scope: Scope) -> tuple[Match, Scope]:
+        """Never match what belongs to the API."""
+        if scope["path"].removeprefix(scope.get("root_path", "")).startswith("/api/"):
+            return Match.NONE, {}
+        return super().matches(scope)
 
 
 async def _not_built() -> Response:
@@ -43,7 +57,7 @@ async def _not_built() -> Response:
 def install(app: FastAPI, folder: Path) -> None:
     """Serve the pages in `folder` at every address that no route takes."""
     if (folder / "index.html").is_file():
-        app.mount("/", Pages(directory=folder, html=True), name="pages")
+        app.router.routes.append(PagesMount("/", Pages(directory=folder, html=True), name="pages"))
     else:
         app.add_api_route("/", _not_built, include_in_schema=False)
         app.add_api_route("/walk/{bake}", _not_built, include_in_schema=False)

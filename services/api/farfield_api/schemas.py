@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
-
 from farfield_core.corridor import Corridor
 from farfield_core.scene import Bounds
 from farfield_core.settings import BakeSettings
+from pydantic import BaseModel, ConfigDict, Field
 
 SCENE = "3f1c9a52d07be846"
 CORRIDOR = "9b0f6c1de2a34875"

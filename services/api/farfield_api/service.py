@@ -5,10 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 
-from farfield_api.bakes import Bakes
-from farfield_api.exceptions import NotNowError
-from farfield_api.scenes import Preparer, Scenes
-from farfield_api.settings import ApiSettings
 from farfield_core import scenes as core_scenes
 from farfield_core.bake import create_bake
 from farfield_core.corridor import Corridor, Ground, parse_corridor
@@ -18,6 +14,11 @@ from farfield_core.ground import ground_of
 from farfield_core.scene import SceneInfo
 from farfield_core.settings import BakeSettings
 from farfield_core.store import Store
+
+from farfield_api.bakes import Bakes
+from farfield_api.exceptions import NotNowError
+from farfield_api.scenes import Preparer, Scenes
+from farfield_api.settings import ApiSettings
 
 
 class FarfieldService:
@@ -84,5 +85,3 @@ class FarfieldService:
 
 def _corridor_key(scene: str, corridor: str) -> str:
     return f"scenes/{scene}/corridors/{corridor}.json"
-
-

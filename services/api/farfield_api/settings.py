@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-
 from farfield_core.errors import BadInputError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 #: setting -> environment variable
 VARIABLES = {

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from farfield_core.plan import Plan, plan
 from fastapi import APIRouter
 
 from farfield_api.dependencies import Service
 from farfield_api.exceptions import problems
 from farfield_api.schemas import BakeRequest
-from farfield_core.plan import Plan, plan
 
 router = APIRouter(tags=["plans"])
 

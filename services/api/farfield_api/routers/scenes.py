@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from farfield_core.corridor import Corridor, cut
+from farfield_core.settings import BakeSettings
 from fastapi import APIRouter, Body
 
 from farfield_api.dependencies import Service
@@ -11,8 +13,6 @@ from farfield_api.exceptions import problems
 from farfield_api.names import SceneId
 from farfield_api.scenes import Described
 from farfield_api.schemas import BOX, PATH, NewCorridor, SceneBody, SceneList
-from farfield_core.corridor import Corridor, cut
-from farfield_core.settings import BakeSettings
 
 router = APIRouter(prefix="/scenes", tags=["scenes"])
 

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from farfield_core import layout
+from farfield_core.bake import read_walk, relocate
+from farfield_core.cells import parse_cell_name
+from farfield_core.errors import NotFoundError
+from farfield_core.walk import Places
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 
@@ -12,11 +17,6 @@ from farfield_api.dependencies import Service
 from farfield_api.exceptions import problems
 from farfield_api.names import BakeId, BlobName, CellName, PageNumber
 from farfield_api.schemas import CellNames
-from farfield_core import layout
-from farfield_core.bake import read_walk, relocate
-from farfield_core.cells import parse_cell_name
-from farfield_core.errors import NotFoundError
-from farfield_core.walk import Places
 
 router = APIRouter(prefix="/walks/{bake}", tags=["walks"], responses=problems(404, 422))
 
@@ -59,7 +59,9 @@ def cell(request: Request, service: Service, bake: BakeId, cell: CellName) -> Re
 def cells(
     service: Service,
     bake: BakeId,
-    page: Annotated[str, Query(pattern=r"^\d{1,9}$", description="`next` of the page before.")] = "0",
+    page: Annotated[
+        str, Query(pattern=r"^\d{1,9}$", description="`next` of the page before.")
+    ] = "0",
 ) -> CellNames:
     """List the cells that exist."""
     names, following = service.bakes.done_page(bake, int(page))
