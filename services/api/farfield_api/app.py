@@ -16,6 +16,7 @@ from fastapi.middleware.gzip import GZipMiddleware
 from fastapi.routing import APIRoute
 
 from farfield_api import __version__, exceptions, pages
+from farfield_api.limits import BodyLimit
 from farfield_api.routers import bakes, events, health, plans, scenes, uploads, walks
 from farfield_api.service import FarfieldService
 from farfield_api.settings import ApiSettings
@@ -67,14 +68,15 @@ def create_app(settings: ApiSettings, service: FarfieldService | None = None) ->
         # Their pages load scripts from elsewhere.
         docs_url=None,
         redoc_url=None,
-        max_body_size=BODY_LIMIT,
         generate_unique_id_function=_operation,
     )
     app.add_middleware(GZipMiddleware, minimum_size=1000, compresslevel=6)
+    app.add_middleware(
+        BodyLimit, limit=BODY_LIMIT, others={f"{PREFIX}/scenes": settings.upload_limit}
+    )
     exceptions.install(app)
-    for module in (health, scenes, plans, bakes, events, walks):
+    for module in (health, scenes, uploads, plans, bakes, events, walks):
         app.include_router(module.router, prefix=PREFIX)
-    app.include_router(uploads.router, prefix=PREFIX, max_body_size=settings.upload_limit)
     pages.install(app, settings.web)
     return app
 

@@ -19,7 +19,7 @@ from farfield_core.bake import done_cells, read_walk
 from farfield_core.cells import CellGrid, Index, cell_name
 from farfield_core.control import Control, read_control, write_control
 from farfield_core.dispatch import BakeStatus, Dispatcher, Event, Listener
-from farfield_core.errors import FarfieldError
+from farfield_core.errors import FarfieldError, NotFoundError
 from farfield_core.store import Store
 from farfield_core.tables import walk_grid
 from farfield_core.walk import Walk
@@ -84,9 +84,9 @@ class Bakes:
         self._seen: dict[str, _Seen] = {}
         self._mine: set[str] = set()
         self._dispatcher = dispatcher(self._listen)
-        self._walk = lru_cache(maxsize=64)(lambda bake: read_walk(store, bake))
+        self.walk = lru_cache(maxsize=64)(self._read_walk)
         self._grid: Callable[[str], CellGrid] = lru_cache(maxsize=4)(
-            lambda bake: walk_grid(store, self._walk(bake))
+            lambda bake: walk_grid(store, self.walk(bake))
         )
 
     def ids(self) -> list[str]:
@@ -111,7 +111,7 @@ class Bakes:
 
     def start(self, bake: str) -> None:
         """Have a bake's missing cells baked; nothing happens if that is under way."""
-        self._walk(bake)
+        self.walk(bake)
         if self.progress(bake).status.state == "running":
             return
         write_control(self._store, bake, "running")
@@ -119,7 +119,7 @@ class Bakes:
 
     def progress(self, bake: str) -> Progress:
         """Where a bake stands; raises NotFoundError."""
-        walk = self._walk(bake)
+        walk = self.walk(bake)
         status = self._dispatcher.status(bake) if self._runs_here(bake) else self._watched(walk)
         return Progress(walk, status, self._rate(bake))
 
@@ -173,7 +173,7 @@ class Bakes:
     def hint(self, bake: str, index: Index) -> None:
         """A viewer asked for a cell and did not get it; raises NotFoundError for no such bake."""
         if not self._runs_here(bake):
-            self._walk(bake)
+            self.walk(bake)
             return
         with self._lock:
             seen = self._look(bake)
@@ -188,13 +188,13 @@ class Bakes:
 
     def done_since(self, bake: str, cursor: int) -> list[str]:
         """Cells that exist, in the order in which this server saw them, without the first."""
-        self._walk(bake)
+        self.walk(bake)
         with self._lock:
             return self._look(bake).done[cursor:]
 
     def done_page(self, bake: str, start: int) -> tuple[list[str], int | None]:
         """Up to `PAGE` cells that exist, and where the next page starts."""
-        self._walk(bake)
+        self.walk(bake)
         with self._lock:
             done = self._look(bake).done
             end = min(start + PAGE, len(done))
@@ -203,6 +203,14 @@ class Bakes:
     def close(self) -> None:
         """Stop all work."""
         self._dispatcher.close()
+
+    def _read_walk(self, bake: str) -> Walk:
+        try:
+            return read_walk(self._store, bake)
+        except NotFoundError:
+            raise NotFoundError(
+                f"There is no bake {bake}; GET /api/v1/bakes lists those there are."
+            ) from None
 
     def _runs_here(self, bake: str) -> bool:
         with self._lock:

@@ -17,17 +17,12 @@ from starlette.exceptions import HTTPException
 log = logging.getLogger(__name__)
 
 
-class TooLargeError(errors.BadInputError):
-    """A request's body is larger than this server takes."""
-
-
 class NotNowError(errors.FarfieldError):
     """What was asked does not fit the state a thing is in."""
 
 
 #: exception -> HTTP status; the nearest class in an exception's order of bases decides
 STATUS: Mapping[type[Exception], HTTPStatus] = {
-    TooLargeError: HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
     NotNowError: HTTPStatus.CONFLICT,
     errors.BadInputError: HTTPStatus.UNPROCESSABLE_ENTITY,
     errors.SceneRefusedError: HTTPStatus.UNPROCESSABLE_ENTITY,
@@ -84,7 +79,7 @@ def problem(
 def _sentence(error: RequestValidationError) -> str:
     """Say the first fault of a request, and where it lies."""
     first = error.errors()[0]
-    place = ".".join(str(part) for part in first["loc"] if part != "body") or "The body"
+    place = ".".join(str(part) for part in first["loc"][1:]) or "The body"
     message = str(first["msg"]).removeprefix("Value error, ").rstrip(".")
     return f"{place}: {message[:1].lower()}{message[1:]}."
 
@@ -104,7 +99,7 @@ async def _http(_: Request, error: Exception) -> JSONResponse:
     detail = str(error.detail)
     if detail == status.phrase:
         detail = {
-            404: "There is nothing at this address; /api/v1/docs lists what there is.",
+            404: "There is nothing at this address; /api/v1/openapi.json lists what there is.",
             405: "This address does not take that method; the Allow header lists those it takes.",
         }.get(status, f"{detail}.")
     return problem(status, detail, error.headers)

@@ -16,7 +16,7 @@ from starlette.types import Scope
 NOT_BUILT = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Farfield</title>
 <p>The server runs, but its pages are not built.
 Run <code>make setup</code>, or set <code>FARFIELD_WEB</code> to a folder that holds them.
-<p>The API is at <a href="/api/v1/docs">/api/v1/docs</a>.</html>
+<p>The API is at <a href="/api/v1/openapi.json">/api/v1/openapi.json</a>.</html>
 """
 
 

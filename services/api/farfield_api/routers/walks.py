@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from farfield_core import layout
-from farfield_core.bake import read_walk, relocate
+from farfield_core.bake import relocate
 from farfield_core.cells import parse_cell_name
 from farfield_core.errors import NotFoundError
 from farfield_core.walk import Places
@@ -30,7 +30,7 @@ _JSON = "application/json"
 @router.get("/walk.json", response_class=Response)
 def manifest(request: Request, service: Service, bake: BakeId) -> Response:
     """Get the manifest, its places relative to this address (docs/format.md)."""
-    walk = relocate(read_walk(service.store, bake), PLACES)
+    walk = relocate(service.bakes.walk(bake), PLACES)
     return immutable.content(request, walk.model_dump_json().encode(), _JSON)
 
 
