@@ -2,6 +2,7 @@
 
 export * from './builder.js';
 export * from './cell-index.js';
+export * from './cell-streamer.js';
 export * from './cells.js';
 export * from './choice.js';
 export * from './corridor.js';
@@ -15,4 +16,5 @@ export * from './near.js';
 export * from './near-material.js';
 export * from './prefetch.js';
 export * from './quads.js';
+export * from './shared-store.js';
 export * from './upload-scheduler.js';
