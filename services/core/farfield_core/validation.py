@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -24,12 +23,9 @@ def explain(error: ValidationError, what: str) -> str:
 
 def parse(model: type[M], data: bytes | str | dict[str, Any], what: str) -> M:
     """Read `data`, JSON text or its content, as `model`; raises BadInputError naming `what`."""
-    if not isinstance(data, dict):
-        try:
-            data = json.loads(data)
-        except (ValueError, RecursionError) as error:
-            raise BadInputError(f"{what} is not JSON: {error}.") from None
     try:
-        return model.model_validate(data)
+        if isinstance(data, dict):
+            return model.model_validate(data)
+        return model.model_validate_json(data)
     except ValidationError as error:
         raise BadInputError(explain(error, what)) from None
