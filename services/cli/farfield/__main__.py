@@ -19,6 +19,7 @@ COMMANDS = {
     "shoot": "One picture of a scene or a walk.",
     "serve": "Serve the API, the pages and baking.",
     "demo": "Bake a corridor and open the walk while it bakes.",
+    "worker": "Bake cells for a farm.",
 }
 
 

@@ -156,6 +156,15 @@ class Store:
                 for meta in chunk:
                     yield str(meta["path"])
 
+    def folders(self, prefix: str) -> tuple[str, ...]:
+        """Names of the folders right under a folder, sorted; cheap however much they hold."""
+        if not prefix.endswith("/"):
+            raise BadInputError(f"{prefix!r} is not a folder; it has to end in a slash.")
+        check_key(prefix[:-1])
+        with _mapped(prefix):
+            found = obstore.list_with_delimiter(self._objects, prefix)["common_prefixes"]
+        return tuple(sorted(str(path).rstrip("/").rsplit("/", 1)[-1] for path in found))
+
     def local_path(self, key: str) -> Path | None:
         """Where an object or folder lies on this machine, None where the store is no folder."""
         if self._root is None:

@@ -76,6 +76,13 @@ class Job:
         self._settle()
         return again
 
+    def fail(self, cell: str, reason: str) -> None:
+        """Somebody else, who counts attempts, has given a cell up."""
+        self.running.discard(cell)
+        self._open.discard(cell)
+        self.failed[cell] = reason
+        self._settle()
+
     def give_up(self, reason: str) -> None:
         """The bake as a whole cannot go on."""
         self.state, self.reason = "failed", reason
