@@ -187,8 +187,9 @@ def _crossings(points: Floats, radius: tuple[float, float], limit: int) -> Itera
             k=column[:, 1],
             low=np.minimum(y0, y1),
             high=np.maximum(y0, y1),
-            along=arc[piece[hit]] + t * np.sqrt(length2),
-            aside=np.hypot(*(to_centre - t[:, None] * flat).T),
+            # rounded, so that what is level sorts as level
+            along=np.round(arc[piece[hit]] + t * np.sqrt(length2), 6),
+            aside=np.round(np.hypot(*(to_centre - t[:, None] * flat).T), 6),
             floor=p[:, 1] + t * step[:, 1],
         )
 
