@@ -31,6 +31,8 @@ from tests.unit.walks import row_of_cells
 
 WORKER = Path(__file__).with_name("farm_worker.py")
 REDIS = shutil.which("redis-server")
+#: how often the same is done to a farm: `make soak` does it for longer
+ROUNDS = 20 if os.environ.get("FARFIELD_SOAK") == "1" else 1
 
 
 def free_port() -> int:
@@ -162,31 +164,34 @@ def test_a_pool_process_that_dies_blames_its_cell_only(broker: str, tmp_path: Pa
 
 def test_a_lost_worker_costs_its_cells_a_second_try(broker: str, tmp_path: Path) -> None:
     store = tmp_path / "store"
-    walk = row_of_cells(Store.open(store), 6)
+    walk = row_of_cells(Store.open(store), 6 * ROUNDS)
     with ExitStack() as stack:
         dispatcher, _ = stack.enter_context(feeder(store, broker))
-        lost = stack.enter_context(worker(broker, store, **{"c*": 0.5}))
         dispatcher.submit(walk.id)
-        until(lambda: dispatcher.status(walk.id).done >= 1)
-        kill(lost)
-        assert dispatcher.status(walk.id).state == "running"
+        for _ in range(ROUNDS):
+            before = dispatcher.status(walk.id).done
+            lost = stack.enter_context(worker(broker, store, **{"c*": 0.5}))
+            until(lambda before=before: dispatcher.status(walk.id).done > before)
+            kill(lost)
+            assert dispatcher.status(walk.id).state == "running"
         stack.enter_context(worker(broker, store))
         assert dispatcher.wait(walk.id, timeout=30).state == "done"
 
 
 def test_losing_redis_loses_nothing(broker: str, tmp_path: Path) -> None:
     store = tmp_path / "store"
-    walk = row_of_cells(Store.open(store), 20)
+    walk = row_of_cells(Store.open(store), 20 * ROUNDS)
     with (
         worker(broker, store, **{"c*": 0.1}),
         feeder(store, broker) as (dispatcher, _),
         Redis.from_url(broker) as redis,
     ):
         dispatcher.submit(walk.id)
-        until(lambda: dispatcher.status(walk.id).done >= 2)
-        redis.flushall()
+        for round_ in range(ROUNDS):
+            until(lambda count=20 * round_ + 2: dispatcher.status(walk.id).done >= count)
+            redis.flushall()
         assert dispatcher.wait(walk.id, timeout=30).state == "done"
-    assert len(done_cells(Store.open(store), walk.id)) == 20
+    assert len(done_cells(Store.open(store), walk.id)) == 20 * ROUNDS
 
 
 def test_pausing_empties_the_queue_and_cancelling_too(broker: str, tmp_path: Path) -> None:
