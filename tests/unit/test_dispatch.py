@@ -193,7 +193,7 @@ def test_pausing_during_the_last_cell_still_ends(run: Run) -> None:
 def test_cancel_stops_at_once_and_blames_nobody(run: Run) -> None:
     with run.dispatcher(jobs=2, c0_0_0="hang once") as dispatcher:
         dispatcher.submit(run.bake)
-        until(lambda: dispatcher.status(run.bake).done == 3)
+        until(lambda: dispatcher.status(run.bake).done == 3 and run.attempts()["0_0_0"] == 1)
         dispatcher.cancel(run.bake)
         status = dispatcher.wait(run.bake, timeout=10)
         assert (status.state, status.done, status.failed) == ("cancelled", 3, 0)
@@ -219,6 +219,21 @@ def test_first_cells_come_first(run: Run) -> None:
         dispatcher.wait(run.bake, timeout=30)
     started = [event.cell for event in run.events if event.kind == "started"]
     assert started == ["0_0_0", "3_0_0", "2_0_0", "1_0_0"]
+
+
+def test_first_cells_come_before_those_of_other_bakes(tmp_path: Path) -> None:
+    one, two = Run(tmp_path / "store"), Run(tmp_path / "store", cells=2)
+    two.events = one.events
+    with one.dispatcher(jobs=1, **{"*": 0.2}) as dispatcher:
+        dispatcher.submit(one.bake)
+        until(lambda: dispatcher.status(one.bake).running == 1)
+        dispatcher.submit(two.bake)
+        dispatcher.first(two.bake, ["1_0_0"])
+        dispatcher.wait(one.bake, timeout=30)
+        with pytest.raises(NotFoundError):
+            dispatcher.first("0123456789abcdef", [])
+    started = [(event.bake, event.cell) for event in one.events if event.kind == "started"]
+    assert started[:3] == [(one.bake, "0_0_0"), (two.bake, "1_0_0"), (two.bake, "0_0_0")]
 
 
 def test_bakes_share_the_processes_in_turn(tmp_path: Path) -> None:

@@ -40,6 +40,26 @@ store_option = click.option(
 )
 
 
+def port_options(function: Function) -> Function:
+    """Where a server listens."""
+    host = click.option(
+        "--host",
+        envvar="FARFIELD_HOST",
+        default="127.0.0.1",
+        show_default=True,
+        help="Address to listen on.",
+    )
+    port = click.option(
+        "--port",
+        type=click.IntRange(0, 65535),
+        envvar="FARFIELD_PORT",
+        default=8000,
+        show_default=True,
+        help="Port to listen on; 0 takes a free one.",
+    )
+    return host(port(function))
+
+
 def option_name(field: str) -> str:
     """Option of a settings field: `cell_size` -> `--cell-size`."""
     return "--" + field.replace("_", "-")

@@ -158,7 +158,11 @@ def open_scene(folder: Path) -> PreparedScene:
         text = (folder / "scene.json").read_text(encoding="utf-8")
     except FileNotFoundError:
         raise NotFoundError(f"There is no prepared scene in {folder}; prepare it first.") from None
-    info = SceneInfo.model_validate_json(text)
+    return map_scene(folder, SceneInfo.model_validate_json(text))
+
+
+def map_scene(folder: Path, info: SceneInfo) -> PreparedScene:
+    """Map the arrays in `folder`, which `info` describes."""
     arrays: dict[str, Any] = {
         name: np.load(folder / f"{name}.npy", mmap_mode="r") for name in ARRAYS
     }

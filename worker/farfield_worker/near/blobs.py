@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -46,10 +47,8 @@ class NearBlocks:
         return self._names[block]
 
     def _store(self, name: str, data: bytes) -> None:
-        try:
+        with suppress(AlreadyExistsError):
             self._put(near_key(name), data)
-        except AlreadyExistsError:
-            pass
 
     def _image(self, texture: int) -> str:
         if texture not in self._images:

@@ -1,4 +1,4 @@
-"""A small writer of binary glTF 2.0 (specification, section 4.4): bytes are a function of content."""
+"""A small writer of binary glTF 2.0 (specification, section 4.4); equal content, equal bytes."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ class TextureUse:
         picture: the pixels.
         wrap_u, wrap_v, filter: how it is sampled.
         texcoord: which set of texture coordinates it reads (glTF's TEXCOORD_n).
-        transform: (2, 3) float as nested tuples, uv' = transform @ (u, v, 1); KHR_texture_transform.
+        transform: (2, 3) float as nested tuples, uv' = transform @ (u, v, 1).
     """
 
     picture: Picture

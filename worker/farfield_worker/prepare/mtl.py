@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from farfield_shading import to_linear
@@ -147,7 +148,7 @@ def _use(picture: Picture, options: dict[str, list[str]]) -> TextureUse:
     return TextureUse(picture, transform=transform if moved else None)
 
 
-def _alpha_mode(material: Material) -> str:
+def _alpha_mode(material: Material) -> Literal["opaque", "blend"]:
     if material.factor[3] < 1:
         return "blend"
     if material.base is None:

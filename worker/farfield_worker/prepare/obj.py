@@ -17,16 +17,6 @@ from farfield_worker.prepare.model import Material, Mesh, Model, one_of_each
 from farfield_worker.prepare.mtl import WHITE, MaterialFile
 
 
-class _NamesOnly:
-    """Gives trimesh a material file of bare names, so that it groups by them and opens nothing."""
-
-    def __init__(self, names: list[str]) -> None:
-        self.stub = "".join(f"newmtl {name}\nillum 1\n" for name in names).encode()
-
-    def __getitem__(self, name: str) -> bytes:
-        return self.stub
-
-
 def read_obj(folder: ModelFolder, limits: Limits) -> Model:
     """Read the OBJ at `folder.model`; raises SceneRefusedError."""
     notes: list[str] = []
@@ -41,7 +31,9 @@ def read_obj(folder: ModelFolder, limits: Limits) -> Model:
     library.close()
     used = dict.fromkeys(re.findall(rb"^usemtl[ \t]+([^\r\n]+)", text, re.MULTILINE))
     names = [line.decode("utf-8", "replace").strip() for line in used]
-    loaded = load_obj(io.BytesIO(b"mtllib names\n" + text), _NamesOnly(names))
+    # bare names, so that trimesh groups by them and opens nothing
+    stub = "".join(f"newmtl {name}\nillum 1\n" for name in names)
+    loaded = load_obj(io.BytesIO(b"mtllib names\n" + text), {"names": stub.encode()})
     parts = list(loaded.get("geometry", {}).values())
     if not parts:
         refuse(folder.name, "it holds no triangles")
@@ -93,7 +85,7 @@ def fan(polygons: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def srgb_colors(colors: Any) -> NDArray[np.uint16] | None:
-    """Linear uint16 RGBA of sRGB vertex colours, (n, 3|4): uint8, or floats in [0, 1] (or to 255)."""
+    """Linear uint16 RGBA of sRGB vertex colours, (n, 3|4) integers or floats."""
     if colors is None:
         return None
     given = np.asarray(colors)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from farfield_core.scene import Batch, Block, Bounds, Part, SceneInfo, Triple
+from farfield_core.scene import Batch, Block, Bounds, Part, SceneInfo, Triple, map_scene
 from numpy.typing import NDArray
 
 from farfield_worker.prepare.arrays import GrowingArray
@@ -17,6 +17,7 @@ from farfield_worker.prepare.batches import TextureFiles, sort_into_batches
 from farfield_worker.prepare.clean import clean
 from farfield_worker.prepare.expand import bounds, centroids
 from farfield_worker.prepare.limits import Limits, refuse
+from farfield_worker.prepare.pictures import draw_pictures
 from farfield_worker.prepare.read import read_model
 from farfield_worker.prepare.split import split
 from farfield_worker.prepare.weld import Welded, weld
@@ -97,6 +98,12 @@ def _prepare(
         blocks=tuple(blocks),
         notes=tuple(model.notes),
     )
+    progress("drawing the map")
+    view = draw_pictures(map_scene(work, info), work)
+    if view is None:
+        note = "There is no map and no thumbnail: this machine offers no OpenGL."
+        info = info.model_copy(update={"notes": (*info.notes, note)})
+    info = info.model_copy(update={"map": view})
     (work / "scene.json").write_text(info.model_dump_json(), encoding="utf-8")
     return info
 

@@ -23,7 +23,7 @@ _LONGEST_HEADER = 1 << 20
 
 
 def read_ply(folder: ModelFolder, limits: Limits) -> Model:
-    """Read the PLY at `folder.model`: double-sided, vertex colours sRGB; raises SceneRefusedError."""
+    """Read the PLY at `folder.model`, double-sided, colours sRGB; raises SceneRefusedError."""
     notes: list[str] = []
     with folder.model.open("rb") as file:
         header = check_header(folder, file)

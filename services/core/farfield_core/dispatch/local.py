@@ -90,7 +90,12 @@ class LocalDispatcher:
     def first(self, bake: str, cells: Iterable[str]) -> None:
         """Bake these cells before all others; the first named comes first."""
         with self._changed:
-            self._job(bake).first(cells)
+            job = self._jobs.pop(bake, None)
+            if job is None:
+                raise _unknown(bake)
+            # its bake comes before the others, too
+            self._jobs = {bake: job, **self._jobs}
+            job.first(cells)
 
     def pause(self, bake: str) -> None:
         """Begin no more cells; those under way are finished."""
@@ -162,7 +167,7 @@ class LocalDispatcher:
         try:
             return self._jobs[bake]
         except KeyError:
-            raise NotFoundError(f"There is no bake {bake} under way.") from None
+            raise _unknown(bake) from None
 
     def _tell(
         self,
@@ -283,3 +288,7 @@ class LocalDispatcher:
             executor = self._executors.pop(slot, None)
         if executor is not None:
             executor.close()
+
+
+def _unknown(bake: str) -> NotFoundError:
+    return NotFoundError(f"There is no bake {bake} under way.")

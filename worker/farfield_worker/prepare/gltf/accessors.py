@@ -61,7 +61,6 @@ class Accessors:
         width = _WIDTHS.get(entry.get("type", ""))
         if dtype is None or width is None:
             self.document.refuse("an accessor has an unknown type")
-            raise AssertionError
         return dtype, width
 
     def floats(self, index: Any, rows: NDArray[Any] | None = None) -> NDArray[np.float32]:
@@ -103,7 +102,7 @@ class Accessors:
 
 
 def to_float(array: NDArray[Any], normalized: bool) -> NDArray[np.float32]:
-    """Floats of an accessor's elements (specification, section 3.6.2.2, and KHR_mesh_quantization)."""
+    """Floats of an accessor's elements (specification, section 3.6.2.2; KHR_mesh_quantization)."""
     out = np.ascontiguousarray(array, np.float32)
     if normalized and array.dtype.kind in "iu":
         out = out / np.float32(np.iinfo(array.dtype).max)

@@ -8,7 +8,7 @@ import json
 import mmap
 import struct
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +54,7 @@ class Document:
             self.refuse("it is not glTF version 2")
         self.json: Json = root
 
-    def refuse(self, cause: str) -> Any:
+    def refuse(self, cause: str) -> NoReturn:
         """Raise SceneRefusedError in this document's name."""
         refuse(self.folder.name, cause)
 
@@ -158,7 +158,6 @@ def data_uri(document: Document, uri: str) -> bytes:
         return base64.b64decode(body, validate=True)
     except binascii.Error:
         document.refuse("it holds a damaged data URI")
-        raise
 
 
 def size_of(document: Document, entry: Json, key: str, default: int | None = None) -> int:
@@ -168,5 +167,4 @@ def size_of(document: Document, entry: Json, key: str, default: int | None = Non
         value = int(value)
     if not isinstance(value, int) or isinstance(value, bool) or value < 0:
         document.refuse(f"a {key} is {value!r}")
-        raise AssertionError
     return value

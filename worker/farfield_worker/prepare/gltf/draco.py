@@ -37,7 +37,6 @@ class DracoPrimitive:
             mesh = DracoPy.decode(data.tobytes())
         except (DracoPy.FileTypeException, RuntimeError, ValueError):
             document.refuse("a primitive compressed with Draco is damaged")
-            raise
         if not isinstance(mesh, DracoPy.DracoMesh):
             document.refuse("a primitive compressed with Draco holds no triangles")
         self.triangles: NDArray[np.uint32] = np.asarray(mesh.faces, np.uint32).reshape(-1, 3)

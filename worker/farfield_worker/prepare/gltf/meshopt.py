@@ -33,7 +33,6 @@ def decode_view(document: Document, packed: Json) -> Bytes:
         out = _decode(packed.get("mode"), count, stride, data)
     except (RuntimeError, ValueError):
         document.refuse("a buffer view compressed with EXT_meshopt_compression is damaged")
-        raise
     name = packed.get("filter", "NONE")
     if name == "NONE":
         return out
@@ -64,4 +63,4 @@ def _decode(mode: Any, count: int, stride: int, data: Bytes) -> Bytes:
         else meshoptimizer.decode_index_sequence
     )
     indices = decode(count, 4, data)
-    return indices.astype("<u4" if stride == 4 else "<u2").view(np.uint8)
+    return np.asarray(indices, "<u4" if stride == 4 else "<u2").view(np.uint8)
