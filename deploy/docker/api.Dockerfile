@@ -9,12 +9,13 @@ FROM python:3.11-slim AS packages
 RUN pip install --no-cache-dir uv==0.13.9
 WORKDIR /build
 COPY requirements.lock ./
+COPY shading/ shading/
 COPY services/core/ services/core/
 COPY services/api/ services/api/
-# The lock constrains versions and hashes; only what these two packages need is installed.
+# The lock constrains versions and hashes; only what these packages need is installed.
 RUN uv venv /opt/farfield && VIRTUAL_ENV=/opt/farfield uv pip install --no-cache \
     --constraint requirements.lock --build-constraint requirements.lock \
-    ./services/core ./services/api
+    ./shading ./services/core ./services/api
 
 FROM python:3.11-slim
 RUN useradd --uid 10001 --create-home farfield && install -d -o farfield -g farfield /store
@@ -22,6 +23,7 @@ COPY --from=packages /opt/farfield /opt/farfield
 COPY --from=web /build/web/app/dist /usr/share/farfield/web
 ENV PATH=/opt/farfield/bin:$PATH \
     PYTHONUNBUFFERED=1 \
+    FARFIELD_HOST=0.0.0.0 \
     FARFIELD_STORE=/store \
     FARFIELD_WEB=/usr/share/farfield/web
 USER farfield
@@ -30,4 +32,4 @@ VOLUME /store
 EXPOSE 8000
 HEALTHCHECK --interval=10s --timeout=3s --start-period=10s CMD ["python", "-c", \
     "import urllib.request as u; u.urlopen('http://127.0.0.1:8000/api/v1/health', timeout=2)"]
-CMD ["uvicorn", "--factory", "farfield_api.app:create_app_from_environment", "--host", "0.0.0.0", "--port", "8000"]
+CMD ["python", "-m", "farfield_api.server"]

@@ -52,6 +52,7 @@ def create_app(settings: ApiSettings, service: FarfieldService | None = None) ->
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         running = service or create_service(settings)
         app.state.service = running
+        app.state.stopping = False
         # Reading a large store takes a while, and the server can serve meanwhile.
         taking_up = Thread(target=running.take_up, name="farfield-take-up", daemon=True)
         taking_up.start()

@@ -9,7 +9,7 @@ from farfield_core import scenes as core_scenes
 from farfield_core.bake import create_bake
 from farfield_core.corridor import Corridor, Ground, parse_corridor
 from farfield_core.dispatch import Dispatcher, Listener
-from farfield_core.errors import BadInputError
+from farfield_core.errors import BadInputError, NotFoundError
 from farfield_core.ground import ground_of
 from farfield_core.scene import SceneInfo
 from farfield_core.settings import BakeSettings
@@ -66,7 +66,13 @@ class FarfieldService:
         """The corridor that a request names or holds; raises NotFoundError."""
         if isinstance(corridor, Corridor):
             return corridor
-        data = self.store.get(_corridor_key(scene, corridor))
+        try:
+            data = self.store.get(_corridor_key(scene, corridor))
+        except NotFoundError:
+            raise NotFoundError(
+                f"There is no corridor {corridor} of scene {scene}; "
+                f"POST /api/v1/scenes/{scene}/corridors keeps one."
+            ) from None
         return parse_corridor(data, f"The corridor {corridor}")
 
     def ground(self, scene: str, corridor: Corridor) -> Ground | None:

@@ -12,7 +12,7 @@ from typing import Annotated
 from uuid import uuid4
 
 import anyio
-from fastapi import APIRouter, Depends, Header
+from fastapi import APIRouter, Depends, Header, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
@@ -53,12 +53,15 @@ def _cursor(last_event_id: str | None) -> int:
     dependencies=[Depends(_known)],
 )
 async def events(
-    service: Service, bake: BakeId, last_event_id: Annotated[str | None, Header()] = None
+    request: Request,
+    service: Service,
+    bake: BakeId,
+    last_event_id: Annotated[str | None, Header()] = None,
 ) -> AsyncIterator[ServerSentEvent]:
-    """Follow a bake; ends when the bake does."""
+    """Follow a bake; ends when the bake does, or without a word when the server stops."""
     cursor = _cursor(last_event_id)
     told: BakeBody | None = None
-    while True:
+    while not request.app.state.stopping:
         body = describe(await run_in_threadpool(service.bakes.progress, bake))
         cells = await run_in_threadpool(service.bakes.done_since, bake, cursor)
         while cells:
