@@ -102,7 +102,7 @@ def water(layout: Layout) -> Surfaces:
         [
             _level(lake, 0.0, _WATER),
             _level(canals, 0.0, _WATER._replace(tint=rgb("b4ccb4"), grain=0.25)),
-            _level(lake[:: 1], -0.6, Look(Material.DARK, rgb("2c4c54"), grain=0.0)),
+            _level(lake[::1], -0.6, Look(Material.DARK, rgb("2c4c54"), grain=0.0)),
         ]
     )
 

@@ -95,31 +95,70 @@ class Wing:
         at, _, _ = self.side(front)
         h = width / 2
         panel = DARK.shaded(self.dice.between(0.8, 1.5))
-        s.box((x - h, y, -0.2), (x + h, y + height, 0.05), panel, at=at, faces=SOUTH,
-              levels=(level, ENDLESS))
+        s.box(
+            (x - h, y, -0.2),
+            (x + h, y + height, 0.05),
+            panel,
+            at=at,
+            faces=SOUTH,
+            levels=(level, ENDLESS),
+        )
         frame = level * 1.25 + 0.15
         after: Levels = (frame, ENDLESS)
         tone = OLD_WOOD.shaded(self.dice.between(0.75, 1.1))
-        s.box((x - h - 0.25, y + height, -0.1), (x + h + 0.25, y + height + 0.24, 0.13), tone,
-              at=at, faces=CLOSED & ~NORTH, levels=after)
+        s.box(
+            (x - h - 0.25, y + height, -0.1),
+            (x + h + 0.25, y + height + 0.24, 0.13),
+            tone,
+            at=at,
+            faces=CLOSED & ~NORTH,
+            levels=after,
+        )
         if door or self.dice.chance(0.6):
             jamb = self.wall.shaded(0.86)
             more: Levels = (frame * 1.3, ENDLESS)
             for side in (-1, 1):
                 a, b = sorted((x + side * h, x + side * (h + 0.18)))
-                s.box((a, y, -0.1), (b, y + height, 0.1), jamb, at=at, faces=STANDING & ~NORTH,
-                      levels=more)
+                s.box(
+                    (a, y, -0.1),
+                    (b, y + height, 0.1),
+                    jamb,
+                    at=at,
+                    faces=STANDING & ~NORTH,
+                    levels=more,
+                )
         if door:
-            s.box((x - h - 0.3, -0.3, -0.2), (x + h + 0.3, 0.16, 0.55), STONE_STEP, at=at,
-                  faces=STANDING & ~NORTH, levels=(frame, ENDLESS))
+            s.box(
+                (x - h - 0.3, -0.3, -0.2),
+                (x + h + 0.3, 0.16, 0.55),
+                STONE_STEP,
+                at=at,
+                faces=STANDING & ~NORTH,
+                levels=(frame, ENDLESS),
+            )
             if self.dice.chance(0.35):
                 cloth = Look(Material.CLOTH, self.dice.pick(CLOTHS), grain=0.8)
-                s.quad(((x - h, y + 0.3, 0.08), (x + h * 0.3, y + 0.35, 0.09),
-                        (x + h * 0.4, y + height, 0.07), (x - h, y + height, 0.07)),
-                       cloth, at=at, uv=(0, 0.5, 1, 0.2), levels=(frame * 1.1, ENDLESS))
+                s.quad(
+                    (
+                        (x - h, y + 0.3, 0.08),
+                        (x + h * 0.3, y + 0.35, 0.09),
+                        (x + h * 0.4, y + height, 0.07),
+                        (x - h, y + height, 0.07),
+                    ),
+                    cloth,
+                    at=at,
+                    uv=(0, 0.5, 1, 0.2),
+                    levels=(frame * 1.1, ENDLESS),
+                )
         elif self.dice.chance(0.55):
-            s.box((x - h - 0.12, y - 0.14, -0.1), (x + h + 0.12, y, 0.16), tone, at=at,
-                  faces=CLOSED & ~NORTH, levels=(frame * 1.15, ENDLESS))
+            s.box(
+                (x - h - 0.12, y - 0.14, -0.1),
+                (x + h + 0.12, y, 0.16),
+                tone,
+                at=at,
+                faces=CLOSED & ~NORTH,
+                levels=(frame * 1.15, ENDLESS),
+            )
 
     def facade(self, front: int, door: bool) -> None:
         """Openings, beams, a painted band and merlons on one side."""
@@ -132,8 +171,14 @@ class Wing:
             tall = dice.between(0.5, 1.1)
             gap = 0.0
             e = length / 2 - 0.02
-            s.box((-e, -0.3, -0.1), (e, tall, 0.06 + gap), band, at=at,
-                  faces=STANDING & ~NORTH, levels=(dice.between(0.4, 0.7), ENDLESS))
+            s.box(
+                (-e, -0.3, -0.1),
+                (e, tall, 0.06 + gap),
+                band,
+                at=at,
+                faces=STANDING & ~NORTH,
+                levels=(dice.between(0.4, 0.7), ENDLESS),
+            )
         slots = max(1, int((length - 0.8) / dice.between(2.3, 3.3)))
         pitch = length / slots
         entrance = slots // 2 if door else -1
@@ -151,8 +196,9 @@ class Wing:
                 elif dice.chance(0.62):
                     tall = dice.between(0.6, 1.05)
                     y = base + min(dice.between(1.2, 1.5), height / storeys - tall - 0.5)
-                    self.opening(front, x, y, dice.between(0.55, 0.95), tall,
-                                 dice.between(0.3, 0.7), False)
+                    self.opening(
+                        front, x, y, dice.between(0.55, 0.95), tall, dice.between(0.3, 0.7), False
+                    )
         if dice.chance(0.75):
             self.beams(at, length, height)
         self.crown(at, length, height)
@@ -164,12 +210,23 @@ class Wing:
         cloth = Look(Material.CLOTH, dice.pick(CLOTHS), grain=0.9)
         low = y - 0.35
         level = dice.between(0.3, 0.6)
-        s.quad(((-w + x, low, d), (w + x, low, d), (w + x, y, 0.06), (-w + x, y, 0.06)), cloth,
-               at=at, uv=(0, w, 1, 0), sag=(0.0, -0.18, 0.0), levels=(level, ENDLESS))
+        s.quad(
+            ((-w + x, low, d), (w + x, low, d), (w + x, y, 0.06), (-w + x, y, 0.06)),
+            cloth,
+            at=at,
+            uv=(0, w, 1, 0),
+            sag=(0.0, -0.18, 0.0),
+            levels=(level, ENDLESS),
+        )
         for side in (-1, 1):
             px = x + side * (w - 0.06)
-            s.box((px - 0.05, -0.2, d - 0.1), (px + 0.05, low + 0.02, d), OLD_WOOD, at=at,
-                  levels=(level * 1.2, ENDLESS))
+            s.box(
+                (px - 0.05, -0.2, d - 0.1),
+                (px + 0.05, low + 0.02, d),
+                OLD_WOOD,
+                at=at,
+                levels=(level * 1.2, ENDLESS),
+            )
 
     def beams(self, at: Place, length: float, height: float) -> None:
         """Round beams that carry the roof and stick out under it."""
@@ -182,8 +239,14 @@ class Wing:
             x = (k + 0.5) / count * length - length / 2
             # every other one earlier, so that rows grow denser
             level = (0.75 if k % 2 else 1.15) + dice.between(-0.2, 0.3)
-            self.sketch.box((x - 0.09, y, -0.1), (x + 0.09, y + 0.18, reach), tone, at=at,
-                            faces=CLOSED & ~NORTH, levels=(level, ENDLESS))
+            self.sketch.box(
+                (x - 0.09, y, -0.1),
+                (x + 0.09, y + 0.18, reach),
+                tone,
+                at=at,
+                faces=CLOSED & ~NORTH,
+                levels=(level, ENDLESS),
+            )
 
     def crown(self, at: Place, length: float, height: float) -> None:
         """What stands on the parapet of one side: merlons, a cornice, or nothing."""
@@ -197,11 +260,23 @@ class Wing:
             for k in range(count):
                 x = (k + 0.5) / count * length - length / 2
                 tall = 0.42 if style else 0.34
-                s.box((x - e, y - 0.02, -0.27), (x + e, y + tall, -0.01), self.wall, at=at,
-                      taper=(0.0, 0.0) if style else (e * 0.55, 0.02), levels=(level, ENDLESS))
+                s.box(
+                    (x - e, y - 0.02, -0.27),
+                    (x + e, y + tall, -0.01),
+                    self.wall,
+                    at=at,
+                    taper=(0.0, 0.0) if style else (e * 0.55, 0.02),
+                    levels=(level, ENDLESS),
+                )
         elif style == 2:
-            s.box((-length / 2 - 0.07, y - 0.2, -0.3), (length / 2 + 0.07, y + 0.06, 0.08),
-                  self.wall.shaded(0.92), at=at, faces=CLOSED, levels=(self.full, ENDLESS))
+            s.box(
+                (-length / 2 - 0.07, y - 0.2, -0.3),
+                (length / 2 + 0.07, y + 0.06, 0.08),
+                self.wall.shaded(0.92),
+                at=at,
+                faces=CLOSED,
+                levels=(self.full, ENDLESS),
+            )
 
     def roofscape(self) -> None:
         """Hatch, pots, mats, a ladder's end on the roof."""
@@ -211,20 +286,35 @@ class Wing:
             return
         if dice.chance(0.3):
             x, z = dice.between(x0, x1 - 1.2), dice.between(z0, z1 - 1.2)
-            s.box((x, self.top - 0.05, z), (x + 1.2, self.top + dice.between(0.5, 0.9), z + 1.2),
-                  self.wall.shaded(0.93), levels=(dice.between(0.35, 0.6), ENDLESS))
+            s.box(
+                (x, self.top - 0.05, z),
+                (x + 1.2, self.top + dice.between(0.5, 0.9), z + 1.2),
+                self.wall.shaded(0.93),
+                levels=(dice.between(0.35, 0.6), ENDLESS),
+            )
         for _ in range(dice.whole(0, 4)):
             x, z, r = dice.between(x0, x1), dice.between(z0, z1), dice.between(0.18, 0.38)
-            s.lathe((x, self.top - 0.02, z), r, r * dice.between(1.7, 2.4), 2,
-                    CLAY.shaded(dice.between(0.8, 1.3)), sides=7, rings=3,
-                    levels=(dice.between(0.7, 1.6), ENDLESS))
+            s.lathe(
+                (x, self.top - 0.02, z),
+                r,
+                r * dice.between(1.7, 2.4),
+                2,
+                CLAY.shaded(dice.between(0.8, 1.3)),
+                sides=7,
+                rings=3,
+                levels=(dice.between(0.7, 1.6), ENDLESS),
+            )
         if dice.chance(0.35):
             x, z = dice.between(x0, x1 - 1.0), dice.between(z0, z1 - 1.0)
             y = self.top + 0.06
             a, b = dice.between(0.8, 1.8), dice.between(0.8, 1.8)
             mat = Look(Material.CLOTH, dice.pick(CLOTHS), grain=0.6)
-            s.quad(((x, y, z + b), (x + a, y, z + b), (x + a, y + 0.05, z), (x, y + 0.05, z)), mat,
-                   uv=(0, 1, 1, 0), levels=(dice.between(0.8, 1.5), ENDLESS))
+            s.quad(
+                ((x, y, z + b), (x + a, y, z + b), (x + a, y + 0.05, z), (x, y + 0.05, z)),
+                mat,
+                uv=(0, 1, 1, 0),
+                levels=(dice.between(0.8, 1.5), ENDLESS),
+            )
 
 
 STONE_STEP = Look(Material.STONE, rgb("c8bba0"), grain=0.2)
@@ -245,9 +335,7 @@ def house(sketch: Sketch, layout: Layout, parcel: Parcel, dice: Dice) -> None:
     front = parcel.front
     at = Place(0.0, 0.0, 0.0, front)
     # local frame: front at +z
-    width, depth = (
-        (area.width, area.depth) if front % 2 == 0 else (area.depth, area.width)
-    )
+    width, depth = (area.width, area.depth) if front % 2 == 0 else (area.depth, area.width)
     mx, mz = (area.x0 + area.x1) / 2, (area.z0 + area.z1) / 2
     at = Place(mx, 0.0, mz, front)
     w, d = width / 2, depth / 2
@@ -297,16 +385,19 @@ def _yard_wall(
         for a, b in ((x0, -1.1), (1.1, x1)):
             s.box((a, STREET - 0.4, z1 - t), (b, tall, z1), wall, at=at)
         for x in (-1.3, 1.3):
-            s.box((x - 0.3, STREET - 0.4, z1 - 0.5), (x + 0.3, tall + 0.5, z1 + 0.12),
-                  wall.shaded(0.9), at=at, levels=(0.5, ENDLESS))
+            s.box(
+                (x - 0.3, STREET - 0.4, z1 - 0.5),
+                (x + 0.3, tall + 0.5, z1 + 0.12),
+                wall.shaded(0.9),
+                at=at,
+                levels=(0.5, ENDLESS),
+            )
         return
     line = {1: (x1 - t, z0, x1, z1), 3: (x0, z0, x0 + t, z1), 2: (x0, z0, x1, z0 + t)}[k]
     s.box((line[0], STREET - 0.4, line[1]), (line[2], tall, line[3]), wall, at=at)
 
 
-def _court(
-    s: Sketch, at: Place, rect: tuple[float, float, float, float], dice: Dice
-) -> None:
+def _court(s: Sketch, at: Place, rect: tuple[float, float, float, float], dice: Dice) -> None:
     """Things in a court: oven, trough, pots, a roof of cloth."""
     x0, z0, x1, z1 = rect[0] + 0.8, rect[1] + 0.8, rect[2] - 0.8, rect[3] - 0.8
     y = HEIGHTS[Ground.COURT]
@@ -314,26 +405,57 @@ def _court(
         return
     if dice.chance(0.5):
         x, z = dice.between(x0, x1), dice.between(z0, z1)
-        s.lathe((x, y - 0.05, z), dice.between(0.8, 1.2), dice.between(0.9, 1.3), 3,
-                LIME.shaded(0.85)._replace(grain=0.0), at=at, sides=8, rings=3,
-                levels=(dice.between(0.3, 0.6), ENDLESS))
+        s.lathe(
+            (x, y - 0.05, z),
+            dice.between(0.8, 1.2),
+            dice.between(0.9, 1.3),
+            3,
+            LIME.shaded(0.85)._replace(grain=0.0),
+            at=at,
+            sides=8,
+            rings=3,
+            levels=(dice.between(0.3, 0.6), ENDLESS),
+        )
     for _ in range(dice.whole(1, 5)):
         x, z, r = dice.between(x0, x1), dice.between(z0, z1), dice.between(0.2, 0.45)
-        s.lathe((x, y - 0.03, z), r, r * dice.between(1.6, 2.3), 2,
-                CLAY.shaded(dice.between(0.75, 1.3)), at=at, sides=7, rings=3,
-                levels=(dice.between(0.7, 1.7), ENDLESS))
+        s.lathe(
+            (x, y - 0.03, z),
+            r,
+            r * dice.between(1.6, 2.3),
+            2,
+            CLAY.shaded(dice.between(0.75, 1.3)),
+            at=at,
+            sides=7,
+            rings=3,
+            levels=(dice.between(0.7, 1.7), ENDLESS),
+        )
     if dice.chance(0.35):
         w, d, h = dice.between(1.2, 1.8), dice.between(1.1, 1.6), y + dice.between(2.1, 2.5)
         x, z = (x0 + x1) / 2, (z0 + z1) / 2
         if x1 - x0 > 2 * w and z1 - z0 > 2 * d:
             cloth = Look(Material.CLOTH, dice.pick(CLOTHS), grain=0.8)
-            s.quad(((x - w, h, z + d), (x + w, h, z + d), (x + w, h + 0.3, z - d),
-                    (x - w, h + 0.3, z - d)), cloth, at=at, uv=(0, 1.5, 1, 0),
-                   sag=(0, -0.2, 0), levels=(dice.between(0.3, 0.6), ENDLESS))
+            s.quad(
+                (
+                    (x - w, h, z + d),
+                    (x + w, h, z + d),
+                    (x + w, h + 0.3, z - d),
+                    (x - w, h + 0.3, z - d),
+                ),
+                cloth,
+                at=at,
+                uv=(0, 1.5, 1, 0),
+                sag=(0, -0.2, 0),
+                levels=(dice.between(0.3, 0.6), ENDLESS),
+            )
             for px in (x - w + 0.05, x + w - 0.05):
                 for pz, top in ((z + d - 0.05, h), (z - d + 0.05, h + 0.3)):
-                    s.box((px - 0.05, y - 0.1, pz - 0.05), (px + 0.05, top + 0.03, pz + 0.05),
-                          OLD_WOOD, at=at, levels=(0.6, ENDLESS))
+                    s.box(
+                        (px - 0.05, y - 0.1, pz - 0.05),
+                        (px + 0.05, top + 0.03, pz + 0.05),
+                        OLD_WOOD,
+                        at=at,
+                        levels=(0.6, ENDLESS),
+                    )
 
 
 def hut(sketch: Sketch, layout: Layout, parcel: Parcel, dice: Dice) -> None:
@@ -357,19 +479,29 @@ def thatched(sketch: Sketch, at: Place, w: float, d: float, dice: Dice) -> None:
     sketch.solids.append((*span, at.y + tall + 0.4 * ridge))
     wall = LIME.tinted(*dice.pick(WALLS[3:])).shaded(dice.between(0.8, 1.0))
     sketch.box((-w, -0.4, -d), (w, tall + 0.1, d), wall._replace(grain=0.3), at=at, faces=SIDES)
-    sketch.box((-0.6, 0.0, d - 0.2), (0.6, 1.85, d + 0.05), DARK, at=at, faces=SOUTH,
-               levels=(0.2, ENDLESS))
+    sketch.box(
+        (-0.6, 0.0, d - 0.2), (0.6, 1.85, d + 0.05), DARK, at=at, faces=SOUTH, levels=(0.2, ENDLESS)
+    )
     for x in (-0.72, 0.72):
-        sketch.box((x - 0.1, 0.0, d - 0.1), (x + 0.1, 2.0, d + 0.1), OLD_WOOD, at=at,
-                   faces=STANDING & ~NORTH, levels=(0.5, ENDLESS))
+        sketch.box(
+            (x - 0.1, 0.0, d - 0.1),
+            (x + 0.1, 2.0, d + 0.1),
+            OLD_WOOD,
+            at=at,
+            faces=STANDING & ~NORTH,
+            levels=(0.5, ENDLESS),
+        )
     e = 0.7
     y, top = tall - 0.35, tall + ridge
     r = w - d * 0.8
     straw = THATCH.shaded(dice.between(0.78, 1.08))
     p = {
-        "sw": (-w - e, y, d + e), "se": (w + e, y, d + e),
-        "ne": (w + e, y, -d - e), "nw": (-w - e, y, -d - e),
-        "a": (-r, top, 0.0), "b": (r, top, 0.0),
+        "sw": (-w - e, y, d + e),
+        "se": (w + e, y, d + e),
+        "ne": (w + e, y, -d - e),
+        "nw": (-w - e, y, -d - e),
+        "a": (-r, top, 0.0),
+        "b": (r, top, 0.0),
     }
     narrow = 0.05
     a2, b2 = (-r, top, narrow), (r, top, narrow)
@@ -382,8 +514,14 @@ def thatched(sketch: Sketch, at: Place, w: float, d: float, dice: Dice) -> None:
         (p["nw"], p["ne"], p["se"], p["sw"]),
     ):
         sketch.quad(corners, straw, at=at)
-    sketch.box((-r - 0.25, top - 0.25, -0.28), (r + 0.25, top + 0.1, 0.28), straw.shaded(0.75),
-               at=at, taper=(0.1, 0.14), levels=(0.45, ENDLESS))
+    sketch.box(
+        (-r - 0.25, top - 0.25, -0.28),
+        (r + 0.25, top + 0.1, 0.28),
+        straw.shaded(0.75),
+        at=at,
+        taper=(0.1, 0.14),
+        levels=(0.45, ENDLESS),
+    )
 
 
 def houses(sketch: Sketch, layout: Layout) -> None:

@@ -92,7 +92,9 @@ def _blur(heights: Map, radius: int) -> Map:
     """Mean over squares of 2 radius + 1 cells."""
     out = heights.astype(np.float64)
     for axis in (0, 1):
-        padded = np.pad(out, [(radius + 1, radius) if a == axis else (0, 0) for a in (0, 1)], "edge")
+        padded = np.pad(
+            out, [(radius + 1, radius) if a == axis else (0, 0) for a in (0, 1)], "edge"
+        )
         total = np.cumsum(padded, axis=axis)
         high = np.take(total, np.arange(2 * radius + 1, total.shape[axis]), axis=axis)
         low = np.take(total, np.arange(0, total.shape[axis] - 2 * radius - 1), axis=axis)

@@ -192,8 +192,14 @@ class Forest:
         picture = np.full(len(plant), _TWIG[species])
         shade = 0.62 + 0.42 * depth * (0.75 + 0.25 * b)
         return self._table(
-            plant, middle, side * (size * wide)[:, None], up * (size * tall * 0.62)[:, None],
-            picture, centre, k, shade,
+            plant,
+            middle,
+            side * (size * wide)[:, None],
+            up * (size * tall * 0.62)[:, None],
+            picture,
+            centre,
+            k,
+            shade,
         )
 
     def _fronds(self, plant: Counts, k: Counts, r: list[Floats]) -> Surfaces:
@@ -214,8 +220,14 @@ class Forest:
         tables = []
         for start, step, (low, high) in ((top, first, (0.0, 0.55)), (middle, second, (0.55, 1.0))):
             table = self._table(
-                plant, start + step / 2, -side, step / 2, np.full(len(plant), foliage.FROND),
-                top - lift * 2.0, k, 0.85 + 0.15 * r[3],
+                plant,
+                start + step / 2,
+                -side,
+                step / 2,
+                np.full(len(plant), foliage.FROND),
+                top - lift * 2.0,
+                k,
+                0.85 + 0.15 * r[3],
             )
             bottom, v = table.uv[:, 0, 1].copy(), table.uv[:, 2, 1].copy()
             table.uv[:, 0, 1] = bottom + v * low
@@ -283,8 +295,15 @@ class Forest:
         )
 
     def _table(
-        self, plant: Counts, middle: Floats, side: Floats, up: Floats, picture: Counts,
-        centre: Floats, k: Counts, shade: Floats | float = 1.0,
+        self,
+        plant: Counts,
+        middle: Floats,
+        side: Floats,
+        up: Floats,
+        picture: Counts,
+        centre: Floats,
+        k: Counts,
+        shade: Floats | float = 1.0,
     ) -> Surfaces:
         shape = np.stack(
             [middle - side - up, middle + side - up, middle + side + up, middle - side + up], axis=1
@@ -297,7 +316,7 @@ class Forest:
         uv4 = _UV[picture]
         n = len(plant)
         uv = np.zeros((n, 3, 2))
-        flip = (uniform(151, plant, k) < 0.5)
+        flip = uniform(151, plant, k) < 0.5
         uv[:, 0, 0] = np.where(flip, uv4[:, 1], uv4[:, 0])
         uv[:, 0, 1] = uv4[:, 2]
         uv[:, 1, 0] = np.where(flip, -1, 1) * (uv4[:, 1] - uv4[:, 0])
@@ -350,8 +369,16 @@ def plant(layout: Layout) -> Forest:
     rows: list[tuple[float, ...]] = []
     wet = layout.classes
 
-    def grow(species: int, x: float, y: float, z: float, h: float, w: float, dice: Dice,
-             along: tuple[float, float] | None = None) -> None:
+    def grow(
+        species: int,
+        x: float,
+        y: float,
+        z: float,
+        h: float,
+        w: float,
+        dice: Dice,
+        along: tuple[float, float] | None = None,
+    ) -> None:
         a = dice.between(-1, 1)
         turn = along or (a, (1 - a * a) ** 0.5)
         warm = dice.between(0.85, 1.15)
@@ -403,13 +430,24 @@ def _garden_bed(grow, strip, dice: Dice) -> None:  # type: ignore[no-untyped-def
             m = 2.5 + (q + 0.5) * (length - 5.0) / sections
             half = (length - 5.0) / sections / 2 * 0.97
             x, z = (strip.x0 + m, strip.z0 + o) if along_x else (strip.x0 + o, strip.z0 + m)
-            grow(crop, x, y, z, tall * dice.between(0.85, 1.1), half, dice,
-                 (1.0, 0.0) if along_x else (0.0, 1.0))
+            grow(
+                crop,
+                x,
+                y,
+                z,
+                tall * dice.between(0.85, 1.1),
+                half,
+                dice,
+                (1.0, 0.0) if along_x else (0.0, 1.0),
+            )
     for end in (0.6, length - 0.6, length / 2):
         for side in (0.5, wide - 0.5):
             if dice.chance(0.45):
-                x, z = (strip.x0 + end, strip.z0 + side) if along_x else (
-                    strip.x0 + side, strip.z0 + end)
+                x, z = (
+                    (strip.x0 + end, strip.z0 + side)
+                    if along_x
+                    else (strip.x0 + side, strip.z0 + end)
+                )
                 h = dice.between(6.0, 10.0)
                 grow(Species.WILLOW, x, y - 0.02, z, h, h * dice.between(0.17, 0.23), dice)
 
@@ -456,7 +494,9 @@ def _shore(grow) -> None:  # type: ignore[no-untyped-def]
         if not 0.15 < y < 75 or (abs(x) < 12 or abs(z) < 12):
             continue
         if y < 0.6 and dice.chance(0.6):
-            grow(Species.AGAVE, x, y - 0.05, z, dice.between(1.2, 2.2), dice.between(0.9, 1.4), dice)
+            grow(
+                Species.AGAVE, x, y - 0.05, z, dice.between(1.2, 2.2), dice.between(0.9, 1.4), dice
+            )
         elif dice.chance(0.75):
             h = dice.between(5.0, 9.5)
             grow(Species.BROAD, x, y - 0.1, z, h, h * dice.between(0.32, 0.45), dice)
