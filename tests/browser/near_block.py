@@ -116,9 +116,7 @@ def near_block(write: Callable[[bytes, str], str]) -> tuple[str, list[int]]:
     def accessor(array: NDArray[Any], kind: str, component: int, **more: Any) -> int:
         data.extend(b"\0" * (-len(data) % 4))
         stride = {} if kind == "SCALAR" else {"byteStride": array.strides[0]}
-        views.append(
-            {"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes, **stride}
-        )
+        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes, **stride})
         data.extend(array.tobytes())
         accessors.append(
             {

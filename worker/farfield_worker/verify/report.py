@@ -147,7 +147,7 @@ class Verifier:
         return ComparedView(cell.cell, pose, figures, full.rgb, drawn.rgb)
 
     def pop(self, cell: CellFile, neighbour: CellFile) -> Iterator[tuple[float, int]]:
-        """FLIP between what two neighbours show at points of their common face, with pixel counts."""
+        """FLIP between two neighbours at points of their common face, with numbers of pixels."""
         a, b = np.array(cell.eyes[0]), np.array(neighbour.eyes[0])
         half = np.array(self.walk.grid.size) / 2
         low, high = np.maximum(a - half, b - half), np.minimum(a + half, b + half)
@@ -165,16 +165,16 @@ class Verifier:
 
     def cells(self) -> list[CellFile]:
         """The cells that are baked."""
-        return list(self._walks.cells())
+        return list(self._walks.baked())
 
 
 def neighbours(cells: list[CellFile]) -> Iterator[tuple[CellFile, CellFile]]:
     """Pairs of cells that share a face, each once."""
     by_index = {cell.cell: cell for cell in cells}
-    for i, j, k in by_index:
+    for (i, j, k), cell in by_index.items():
         for other in ((i + 1, j, k), (i, j + 1, k), (i, j, k + 1)):
             if other in by_index:
-                yield by_index[i, j, k], by_index[other]
+                yield cell, by_index[other]
 
 
 def verify(
