@@ -39,9 +39,7 @@ def _numbers(option: str, text: str, count: int) -> list[float]:
 @click.option("--size", default=512, show_default=True, help="Pixels across.")
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="PNG file to write.")
 @store_option
-def command(
-    target: str, eye: str, look: str, fov: float, size: int, out: Path, store: str
-) -> None:
+def command(target: str, eye: str, look: str, fov: float, size: int, out: Path, store: str) -> None:
     """Draw one picture of TARGET.
 
     TARGET is a walk (a store with one bake, a bake's folder or its walk.json), drawn from its files
