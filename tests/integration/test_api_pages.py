@@ -1,5 +1,6 @@
 """The built pages and their addresses."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -21,8 +22,9 @@ def dist(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def client(tmp_path: Path, dist: Path) -> TestClient:
-    return TestClient(app_over(tmp_path / "store", web=dist))
+def client(tmp_path: Path, dist: Path) -> Iterator[TestClient]:
+    with TestClient(app_over(tmp_path / "store", web=dist)) as client:
+        yield client
 
 
 @pytest.mark.parametrize(
@@ -68,7 +70,8 @@ def test_the_api_keeps_its_own_addresses(client: TestClient) -> None:
 
 @pytest.mark.parametrize("address", ["/", "/walk/c4d07e9a1b5f3286"])
 def test_a_server_without_pages_says_how_to_get_them(tmp_path: Path, address: str) -> None:
-    answer = TestClient(app_over(tmp_path / "store")).get(address)
+    with TestClient(app_over(tmp_path / "store")) as client:
+        answer = client.get(address)
     assert answer.status_code == 503
     assert "make setup" in answer.text
     assert answer.headers["cache-control"] == "no-store"

@@ -53,7 +53,7 @@ def test_compose_builds_from_dockerfiles_that_exist() -> None:
         build = services[name]["build"]
         assert (ROOT / build["context"] / build["dockerfile"]).is_file()
         assert services[name]["environment"]["FARFIELD_BROKER"].startswith("redis://redis:")
-        assert services[name]["volumes"] == ["store:/store"]
+        assert "store:/store" in services[name]["volumes"]
 
 
 def test_compose_publishes_on_loopback_only() -> None:

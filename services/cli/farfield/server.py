@@ -7,6 +7,7 @@ import threading
 import time
 
 import uvicorn
+from farfield_api.server import Server as StoppingServer
 from farfield_core.errors import BadInputError, FarfieldError
 from fastapi import FastAPI
 
@@ -24,7 +25,7 @@ class Server:
         shown = "127.0.0.1" if host in ("", "0.0.0.0", "::") else host
         self.address = f"http://{f'[{shown}]' if ':' in shown else shown}:{port}"
         config = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=3)
-        self._server = uvicorn.Server(config)
+        self._server = StoppingServer(config)
         self._thread: threading.Thread | None = None
 
     def run(self) -> None:
