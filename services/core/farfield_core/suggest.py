@@ -75,7 +75,7 @@ def guess_scale(bounds: Bounds) -> Scale:
     unit = 1000.0 if height > 500 and height > 0.1 * max(width, depth) else 1.0
     across = max(min(width, depth), 0.05 * max(width, depth, height), 1e-6)
     cell = min(_CELL * unit, _CELL_SHARE * across)
-    return Scale(eye=min(_EYE * unit, 0.7 * height or cell, 8 * cell), cell=cell)
+    return Scale(eye=min(_EYE * unit, 0.7 * height or cell), cell=cell)
 
 
 def _walk(scene: PreparedScene, scale: Scale) -> Floats:
@@ -158,6 +158,8 @@ def _ranked_runs(x: Floats, z: Floats, floor: Floats, scale: Scale) -> list[tupl
     found: list[tuple[float, Floats, Floats]] = []
     for di, dk in ((1, 0), (0, 1), (1, 1), (1, -1)):
         step = float(np.hypot(di * (x[1] - x[0]), dk * (z[1] - z[0])))
+        if step == 0:  # a scene without any width
+            continue
         steps = max(1, int(np.ceil(_LENGTH * scale.cell / step)))
         for i in range(len(x)):
             for k in range(len(z)):
