@@ -75,7 +75,8 @@ def box(
             for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
                 positions.append(centre + half * (normal + s * a + t * b))
                 normals.append([*(127 * normal), 0])
-                uvs.append([1.5 * s, 1.5 * t])
+                # Few repetitions a metre: magnified everywhere, so that no mipmap is involved.
+                uvs.append([0.6 * s * (half @ a), 0.6 * t * (half @ b)])
             order = [0, 1, 2, 0, 2, 3] if sign > 0 else [0, 2, 1, 0, 3, 2]
             triangles.extend(first + n for n in order)
     return (
