@@ -1,5 +1,8 @@
 """An A-buffer of one face: every fragment beyond the near border (Carpenter 1984).
 
+Surfaces that cross the near border are followed one texel further in, so that their quads can
+reach the border itself and no crack shows there (slanted/near_border.py).
+
 The scene is drawn once without a depth test; each fragment appends itself to a storage buffer. The
 buffer holds what one binding may (llvmpipe: 128 MiB); where a face has more, its triangles are
 drawn in as many parts as it takes. Material, sampling grid and border test are those of the
@@ -16,7 +19,6 @@ from numpy.typing import NDArray
 
 from farfield_worker.gl import context as gl
 from farfield_worker.gl.scene_buffers import SceneBuffers
-from farfield_worker.render.borders import NEAR_CLIP
 from farfield_worker.render.target import VERTEX
 from farfield_worker.slanted.fragments import Fragments, sort_fragments
 from farfield_worker.slanted.near_border import walls
@@ -25,6 +27,9 @@ from farfield_worker.visibility.blocks import ranges_in_view
 Floats = NDArray[np.float64]
 
 _RECORD = 16
+#: The near clip plane as a share of the near border's distance: far enough inside for the texels
+#: that follow surfaces into the near field.
+CLIP = 0.5
 #: bytes of the storage buffer
 _BYTES = 96 << 20
 
@@ -42,7 +47,8 @@ void main() {
   float border = dot(walls[0], w);
   for (int i = 1; i < 5; i++) border = max(border, dot(walls[i], w));
   float disparity = gl_FragCoord.w;
-  if (disparity > border) discard;
+  float inside = disparity - border;
+  if (inside > fwidth(inside)) discard;
   uint place = atomicAdd(count, 1u);
   if (place < capacity) {
     uint texel = uint(gl_FragCoord.y) * uint(resolution) + uint(gl_FragCoord.x);
@@ -72,7 +78,8 @@ class ABuffer:
     ) -> Fragments:
         """All fragments of `face` of `eye` (3,) outside the cube of half width `near`.
 
-        The cube lies around `centre` (3,), which is the eye unless given.
+        The cube lies around `centre` (3,), which is the eye unless given. Where a surface enters
+        the cube, its first texel inside is there as well.
         """
         middle = np.asarray(eye if centre is None else centre, np.float64)
         offset = np.asarray(eye, np.float64) - middle
@@ -80,12 +87,12 @@ class ABuffer:
         planes = walls(face, offset, near)
         border[:] = planes[0]
         border[: len(planes)] = planes
-        # a wall is nearest at the corner that the eye leans to
-        nearest = near - float(np.abs(offset).max())
+        # a wall is nearest where the eye leans to it
+        nearest = CLIP * (near - float(np.abs(offset).max()))
         ranges = ranges_in_view(self.scene, eye, face, nearest)
         records = []
         with gl.current() as context:
-            self._begin(context, eye, face, NEAR_CLIP * nearest, resolution)
+            self._begin(context, eye, face, nearest, resolution)
             self.buffers.set(walls=[tuple(w) for w in border])
             pending = [ranges]
             while pending:

@@ -6,6 +6,7 @@ normal n at distance `near` from the centre is the plane of disparity (n . w) / 
 a point lies in the cube where its disparity exceeds the greatest of the six. So a quad is split
 along that function: what lies outside stays, what lies inside is drawn on the wall that it is seen
 through. The walls lie between the true surface, which is outside, and the quad: nearer the truth.
+Where the surface itself goes on inside, as polygons, the quad is cut off at the border instead.
 """
 
 from __future__ import annotations
@@ -43,12 +44,19 @@ def walls(face: int, eye: Floats, near: float) -> Floats:
     return np.asarray(all_planes[first])
 
 
+def inside(disparity: Floats, u: Floats, v: Floats, wall_planes: Floats) -> NDArray[np.bool_]:
+    """Whether points of `disparity` (n,) at (u, v) (n,), (n,) lie in the near cube: (n,) bool."""
+    borders = wall_planes[:, :1] * u + wall_planes[:, 1:2] * v + wall_planes[:, 2:]
+    return np.asarray(disparity > borders.max(axis=0))
+
+
 def split(
-    polygon: Floats, plane: Floats, wall_planes: Floats, resolution: int
+    polygon: Floats, plane: Floats, wall_planes: Floats, resolution: int, cut: bool = False
 ) -> list[tuple[Floats, Floats]]:
     """Split a convex `polygon` (k, 2), texels, drawn on `plane` (3,) at the near border.
 
-    Returns convex parts (polygon, plane) that cover it without overlap; most often itself alone.
+    Returns convex parts (polygon, plane) that cover it without overlap, most often itself alone;
+    with `cut` only the parts outside the near field.
     """
     lines = np.array([texel_line(p, resolution) for p in wall_planes])
     own = texel_line(plane, resolution)
@@ -61,7 +69,7 @@ def split(
         parts.append((_clip(within, line - own), plane))
         within = _clip(within, own - line)
     for k, line in enumerate(lines):
-        part = within
+        part = np.zeros((0, 2)) if cut else within
         for other in np.delete(lines, k, axis=0):
             part = _clip(part, line - other)
         parts.append((part, wall_planes[k]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from farfield_core.faces import texel_centres
 from numpy.typing import NDArray
 
 from farfield_worker.slanted.clip import (
@@ -15,7 +16,7 @@ from farfield_worker.slanted.clip import (
 from farfield_worker.slanted.fill import SheetTexels, fill
 from farfield_worker.slanted.fragments import Fragments
 from farfield_worker.slanted.grid import texel_starts
-from farfield_worker.slanted.near_border import split
+from farfield_worker.slanted.near_border import inside, split
 from farfield_worker.slanted.planes import TrianglePlanes
 from farfield_worker.slanted.segment import SegmentSettings, Sheets, segment
 from farfield_worker.slanted.tolerance import Tolerance
@@ -64,23 +65,40 @@ def face_quads(
     than `least` texels are dropped.
     """
     disparity = fragments.disparity.astype(np.float64)
-    low, high = tolerance.interval(disparity)
+    u, v = texel_uv(fragments.texel, resolution)
+    far = ~inside(disparity, u, v, walls)
+    low, high = tolerance.interval(disparity[far])
     sheets = segment(
-        fragments.texel, disparity, low, high, seed, triangles.plane, resolution, settings
+        fragments.texel[far],
+        disparity[far],
+        low,
+        high,
+        seed[far],
+        triangles.plane,
+        resolution,
+        settings,
     )
+    # what lies in the near field is captured by none but may fill
+    owner = np.full(len(disparity), -1, np.int32)
+    owner[far] = sheets.owner
+    sheets = sheets._replace(owner=owner)
     if least > 1:
         sheets = _drop(sheets, least)
+        owner = sheets.owner
     low2, high2 = tolerance.interval(disparity, 2.0)
     starts = texel_starts(fragments.texel, resolution)
     texels = fill(sheets, starts, disparity, low2, high2, resolution)
     nearest, farthest = disparity_range(texels, disparity, seed, triangles, tolerance, resolution)
+    drawn = np.einsum("ij,ij->i", sheets.plane[owner], np.stack([u, v, np.ones_like(u)], axis=1))
+    dips = np.zeros(len(sheets.rect), np.bool_)
+    dips[owner[(owner >= 0) & inside(drawn, u, v, walls)]] = True
     sheet, polygons, planes = [], [], []
     for s, plane in enumerate(sheets.plane):
         rectangle = grown_rectangle(texels.rect[s])
         whole = clip_to_range(rectangle, plane, nearest[s], farthest[s], resolution)
         if len(whole) < 3:
             continue
-        for part, part_plane in split(whole, plane, walls, resolution):
+        for part, part_plane in split(whole, plane, walls, resolution, cut=not dips[s]):
             for polygon in limit_corners(part):
                 sheet.append(s)
                 polygons.append(polygon)
@@ -93,6 +111,12 @@ def face_quads(
         texels,
         sheet_images(texels, fragments.color, resolution),
     )
+
+
+def texel_uv(texel: Ints, resolution: int) -> tuple[Floats, Floats]:
+    """Face coordinates of the centres of `texel` (n,): (n,), (n,) float."""
+    centres = texel_centres(resolution)
+    return centres[texel % resolution], centres[texel // resolution]
 
 
 def sheet_images(

@@ -53,9 +53,16 @@ def seen(
             disparity = np.empty(len(points))
             resolution = maps.resolution
             if _project(points, result, eye, _AXES[face], resolution, texel, disparity):
-                nearest = maps.map(eye, face).disparity.reshape(-1)
+                nearest = farthest_around(maps.map(eye, face).disparity).reshape(-1)
                 _test(texel, disparity, slack, nearest, result)
     return result
+
+
+def farthest_around(disparity: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Least disparity in the 3 x 3 texels around each of a map (h, w): (h, w) float32."""
+    grown = np.pad(disparity, 1, mode="edge")
+    rows = np.minimum(np.minimum(grown[:-2], grown[1:-1]), grown[2:])
+    return np.minimum(np.minimum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:])
 
 
 def triangles_seen(eyes: Floats, maps: MapSource, triangles: int) -> NDArray[np.bool_]:
