@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from farfield_core.faces import FACES
+from farfield_core.scene import PreparedScene
 
 Floats = NDArray[np.float64]
 
@@ -44,3 +45,15 @@ def triangle_planes(face: int, eye: Floats, corners: Floats) -> TrianglePlanes:
     z = p @ axes.forward
     disparity = np.where(z > 0, 1.0 / np.where(z > 0, z, 1.0), np.inf)
     return TrianglePlanes(plane, disparity.min(axis=1), disparity.max(axis=1))
+
+
+def seeds(
+    scene: PreparedScene, eye: Floats, face: int, triangle: NDArray[np.int32]
+) -> tuple[NDArray[np.int32], TrianglePlanes]:
+    """Planes of the triangles that fragments show, and the row of each fragment's: (n,) int32.
+
+    `triangle` (n,) are the scene's triangle indices, `eye` (3,) is in scene coordinates.
+    """
+    shown, row = np.unique(triangle, return_inverse=True)
+    corners = scene.positions[scene.triangles[shown]].astype(np.float64)
+    return row.astype(np.int32), triangle_planes(face, eye - scene.origin, corners)
