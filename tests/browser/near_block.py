@@ -75,7 +75,8 @@ def box(
             for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
                 positions.append(centre + half * (normal + s * a + t * b))
                 normals.append([*(127 * normal), 0])
-                uvs.append([1.5 * s, 1.5 * t])
+                # Few repetitions a metre: magnified everywhere, so that no mipmap is involved.
+                uvs.append([0.6 * s * (half @ a), 0.6 * t * (half @ b)])
             order = [0, 1, 2, 0, 2, 3] if sign > 0 else [0, 2, 1, 0, 3, 2]
             triangles.extend(first + n for n in order)
     return (
@@ -116,9 +117,7 @@ def near_block(write: Callable[[bytes, str], str]) -> tuple[str, list[int]]:
     def accessor(array: NDArray[Any], kind: str, component: int, **more: Any) -> int:
         data.extend(b"\0" * (-len(data) % 4))
         stride = {} if kind == "SCALAR" else {"byteStride": array.strides[0]}
-        views.append(
-            {"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes, **stride}
-        )
+        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes, **stride})
         data.extend(array.tobytes())
         accessors.append(
             {

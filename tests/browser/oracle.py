@@ -108,9 +108,7 @@ def draw_near(picture: Picture, cell: dict[str, Any], walk: dict[str, Any], fold
                 name: values_of(gltf, data, accessor)
                 for name, accessor in primitive["attributes"].items()
             }
-            positions = values["POSITION"] * np.array(node["scale"]) + np.array(
-                node["translation"]
-            )
+            positions = values["POSITION"] * np.array(node["scale"]) + np.array(node["translation"])
             triangles = values_of(gltf, data, primitive["indices"]).astype(int).reshape(-1, 3)
             material = gltf["materials"][primitive["material"]]
             for triangle in triangles[first : first + count]:

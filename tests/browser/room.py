@@ -44,9 +44,7 @@ Painter = Callable[[Floats, Floats], NDArray[np.uint8]]
 class Page:
     """An atlas page being filled shelf by shelf."""
 
-    pixels: NDArray[np.uint8] = field(
-        default_factory=lambda: np.zeros((PAGE, PAGE, 4), np.uint8)
-    )
+    pixels: NDArray[np.uint8] = field(default_factory=lambda: np.zeros((PAGE, PAGE, 4), np.uint8))
     x: int = 0
     y: int = 0
     shelf: int = 0

@@ -52,7 +52,16 @@ def test_files_are_put_whole(store: Store, tmp_path: Path) -> None:
     assert store.put_new("one", file) is True
     assert store.put_new("one", file) is False
     store.put("two", file)
+    store.put("two", file)
     assert store.get("one") == store.get("two") == file.read_bytes()
+    assert set(store.list("")) == {"one", "two"}
+
+
+def test_unfinished_copies_are_not_listed(tmp_path: Path) -> None:
+    store = Store.open(tmp_path)
+    store.put("a/b", b"")
+    (tmp_path / "a" / "c#123456").write_bytes(b"half")
+    assert list(store.list("a/")) == ["a/b"]
 
 
 def test_ranges(store: Store) -> None:

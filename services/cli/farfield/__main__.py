@@ -16,6 +16,7 @@ COMMANDS = {
     "layers": "Where layers and borders lie.",
     "plan": "What a bake will come to; renders nothing.",
     "bake": "Bake a corridor through a scene.",
+    "verify": "How good a walk is, against full renders.",
     "shoot": "One picture of a scene or a walk.",
     "serve": "Serve the API, the pages and baking.",
     "demo": "Bake a corridor and open the walk while it bakes.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from farfield_core import layout
 from farfield_core.bake import done_cells
 from farfield_core.cells import Index
 from farfield_core.dispatch import BakeStatus, Event
+from farfield_core.dispatch.executor import COMMAND
 from farfield_core.dispatch.local import LocalDispatcher
 from farfield_core.store import Store
 from farfield_core.walk import Walk
@@ -63,11 +64,13 @@ class Means:
         return {"seconds_per_cell": means.pop("seconds"), **means}
 
 
-def bake_all(store: Store, walk: Walk, jobs: int | None) -> Outcome:
+def bake_all(
+    store: Store, walk: Walk, jobs: int | None, command: Sequence[str] = COMMAND
+) -> Outcome:
     """Bake what is missing of a walk.
 
-    When interrupted, says that running again resumes and lets KeyboardInterrupt pass; what is baked
-    stays.
+    `command` starts an executor. When interrupted, says that running again resumes and lets
+    KeyboardInterrupt pass; what is baked stays.
     """
     before = done_cells(store, walk.id)
     means = Means()
@@ -80,7 +83,7 @@ def bake_all(store: Store, walk: Walk, jobs: int | None) -> Outcome:
             elif event.kind in ("retried", "failed"):
                 progress.say(f"Cell {event.cell} {event.kind}: {event.reason}")
 
-        dispatcher = LocalDispatcher(store, jobs, listen)
+        dispatcher = LocalDispatcher(store, jobs, listen, command)
         try:
             dispatcher.submit(walk.id)
             status = dispatcher.wait(walk.id)

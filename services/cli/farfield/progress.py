@@ -48,13 +48,13 @@ class _CellsPerSecond(ProgressColumn):
 class CellProgress:
     """Cells done, cells per second and the time left."""
 
-    def __init__(self, total: int, done: int) -> None:
+    def __init__(self, total: int, done: int, what: str = "baking") -> None:
         self._console = console()
         self._total = total
         self._first = self._done = done
         self._began = self._said = time.monotonic()
         self._bar = Progress(
-            TextColumn("baking"),
+            TextColumn(what),
             BarColumn(),
             MofNCompleteColumn(),
             TextColumn("cells"),
@@ -64,7 +64,7 @@ class CellProgress:
             console=self._console,
             disable=not self._console.is_terminal,
         )
-        self._task = self._bar.add_task("baking", total=total, completed=done)
+        self._task = self._bar.add_task(what, total=total, completed=done)
 
     def __enter__(self) -> CellProgress:
         self._bar.start()

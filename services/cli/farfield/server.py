@@ -5,6 +5,8 @@ from __future__ import annotations
 import socket
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import uvicorn
 from farfield_api.server import Server as StoppingServer
@@ -13,40 +15,43 @@ from fastapi import FastAPI
 
 
 class Server:
-    """Serves `app`; the port is taken at once, so that a taken one is told before any work.
+    """Serves an app; the port is taken at once, so that a taken one is told before any work.
 
     Attributes:
         address: where a browser finds it.
     """
 
-    def __init__(self, app: FastAPI, host: str, port: int) -> None:
+    def __init__(self, host: str, port: int) -> None:
         self._socket = _bind(host, port)
         port = self._socket.getsockname()[1]
         shown = "127.0.0.1" if host in ("", "0.0.0.0", "::") else host
         self.address = f"http://{f'[{shown}]' if ':' in shown else shown}:{port}"
-        config = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=3)
-        self._server = StoppingServer(config)
-        self._thread: threading.Thread | None = None
 
-    def run(self) -> None:
+    def run(self, app: FastAPI) -> None:
         """Serve until interrupted."""
-        self._server.run(sockets=[self._socket])
+        _stopping_server(app).run(sockets=[self._socket])
 
-    def start(self) -> None:
-        """Serve in the background; returns once requests are answered."""
-        self._thread = threading.Thread(target=self.run, name="farfield-server", daemon=True)
-        self._thread.start()
-        while not self._server.started:
-            if not self._thread.is_alive():
-                raise FarfieldError("The server could not start; its log says why.")
-            time.sleep(0.01)
+    @contextmanager
+    def beside(self, app: FastAPI) -> Iterator[None]:
+        """Serve in the background for as long as the context lasts."""
+        server = _stopping_server(app)
+        thread = threading.Thread(
+            target=server.run, args=([self._socket],), name="farfield-server", daemon=True
+        )
+        thread.start()
+        try:
+            while not server.started:
+                if not thread.is_alive():
+                    raise FarfieldError("The server could not start; its log says why.")
+                time.sleep(0.01)
+            yield
+        finally:
+            server.should_exit = True
+            thread.join()
 
-    def stop(self) -> None:
-        """End a server in the background."""
-        self._server.should_exit = True
-        if self._thread is not None:
-            self._thread.join()
-        self._socket.close()
+
+def _stopping_server(app: FastAPI) -> StoppingServer:
+    return StoppingServer(uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=3))
 
 
 def _bind(host: str, port: int) -> socket.socket:

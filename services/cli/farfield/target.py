@@ -26,15 +26,16 @@ def prepared_scene(store: Store, scene: str) -> SceneInfo:
 
     Raises NotFoundError, and SceneRefusedError, after which nothing of the scene is left.
     """
-    if not is_file(scene):
-        scenes.scene_state(store, scene)
-        return prepare_in(store, scene, scene)
     identity = None
     try:
+        if not is_file(scene):
+            scenes.scene_state(store, scene)
+            return prepare_in(store, scene, scene)
+        sources.source_files(Path(scene))  # complain before anything is said to be read
         with working(f"Reading {Path(scene).name}"):
             identity = scenes.import_source(store, Path(scene))
         return prepare_in(store, identity, Path(scene).name)
-    except SceneRefusedError:
+    except (NotFoundError, SceneRefusedError):
         if identity is not None:
             forget_scene(store, identity)
         store.remove_if_empty()

@@ -14,7 +14,7 @@ from farfield_core.scene import Block, PreparedScene
 Ints = NDArray[np.int64]
 
 #: surfaces steeper than this are walls, not ground: cosine of 60 degrees
-_UPRIGHT = 0.5
+UPRIGHT = 0.5
 #: (triangle, point) pairs looked at together
 _BATCH = 1 << 21
 
@@ -25,12 +25,13 @@ class Surfaces(NamedTuple):
     Attributes:
         line: (n,) int64, which line.
         y: (n,) float, height, scene coordinates.
-        walkable: (n,) bool, whether the surface is less than 60 degrees steep.
+        up: (n,) float, cosine of the angle between the surface's normal and up; negative where it
+            faces down.
     """
 
     line: Ints
     y: Floats
-    walkable: NDArray[np.bool_]
+    up: Floats
 
 
 def ground_of(scene: PreparedScene) -> Ground:
@@ -41,7 +42,8 @@ def ground_of(scene: PreparedScene) -> Ground:
 
     def ground(x: Floats, z: Floats, hint: Floats) -> Floats:
         hits = surfaces(scene, x, z)
-        line, y = hits.line[hits.walkable], hits.y[hits.walkable]
+        flat = np.abs(hits.up) > UPRIGHT
+        line, y = hits.line[flat], hits.y[flat]
         order = np.lexsort((np.abs(y - hint[line]), line))
         line, y = line[order], y[order]
         first = np.ones(len(line), bool)
@@ -58,7 +60,7 @@ def surfaces(scene: PreparedScene, x: Floats, z: Floats) -> Surfaces:
     ox, oy, oz = scene.origin
     x, z = x - ox, z - oz
     order = np.argsort(x, kind="stable")
-    found: list[tuple[Ints, Floats, NDArray[np.bool_]]] = []
+    found: list[tuple[Ints, Floats, Floats]] = []
     for block in scene.info.blocks:
         low = np.searchsorted(x[order], block.low[0], side="left")
         high = np.searchsorted(x[order], block.high[0], side="right")
@@ -68,14 +70,14 @@ def surfaces(scene: PreparedScene, x: Floats, z: Floats) -> Surfaces:
             found += _block_hits(scene, block, x[lines], z[lines], lines)
     line = np.concatenate([hit[0] for hit in found] or [np.zeros(0, np.int64)])
     y = np.concatenate([hit[1] for hit in found] or [np.zeros(0)]) + oy
-    walkable = np.concatenate([hit[2] for hit in found] or [np.zeros(0, bool)])
+    up = np.concatenate([hit[2] for hit in found] or [np.zeros(0)])
     by_line = np.lexsort((y, line))
-    return Surfaces(line[by_line], y[by_line], walkable[by_line])
+    return Surfaces(line[by_line], y[by_line], up[by_line])
 
 
 def _block_hits(
     scene: PreparedScene, block: Block, x: Floats, z: Floats, lines: Ints
-) -> Iterator[tuple[Ints, Floats, NDArray[np.bool_]]]:
+) -> Iterator[tuple[Ints, Floats, Floats]]:
     """Hits on one block of lines sorted by x, all relative to the scene's origin."""
     span = slice(block.first_triangle, block.first_triangle + block.triangles)
     corners = np.asarray(scene.positions[scene.triangles[span]], np.float64)
@@ -99,8 +101,8 @@ def _block_hits(
         with np.errstate(divide="ignore", invalid="ignore"):
             v = (px * ac[:, 2] - pz * ac[:, 0]) / area
             w = (pz * ab[:, 0] - px * ab[:, 2]) / area
-        hit = (v >= -1e-9) & (w >= -1e-9) & (v + w <= 1 + 1e-9)
+            hit = (v >= -1e-9) & (w >= -1e-9) & (v + w <= 1 + 1e-9)
         normal = np.cross(ab[hit], ac[hit])
-        upright = np.abs(normal[:, 1]) > _UPRIGHT * np.linalg.norm(normal, axis=1)
+        up = normal[:, 1] / np.linalg.norm(normal, axis=1)
         y = a[hit, 1] + v[hit] * ab[hit, 1] + w[hit] * ac[hit, 1]
-        yield lines[at[hit]], y, upright
+        yield lines[at[hit]], y, up

@@ -56,9 +56,9 @@ REFERENCE_LAYERS = 64
 REFERENCE_RESOLUTION = 512
 REFERENCE_TRIANGLES = 877_000
 
-#: One cell of a dense city, 877k triangles, 512 texels, 64 layers, four faces, two CPU cores, from
-#: the tables of docs/performance.md. Exponents: layers from the same city at 328 layers, texels
-#: from 1024 texels, triangles from the floor of the culled draw loop.
+#: One cell of a dense city, 877k triangles, 512 texels, 64 layers, four faces, two CPU cores.
+#: Exponents: layers from the same city at 328 layers, texels from 1024 texels, triangles from the
+#: floor of the culled draw loop.
 COSTS = {
     "seconds": _Cost(value=0.82, layers=0.8, texels=0.8, triangles=0.5),
     "bytes": _Cost(value=779e3, layers=0.77, texels=1.5, triangles=0.0),

@@ -8,6 +8,8 @@ A write shows up whole or not at all.
 from __future__ import annotations
 
 import re
+import secrets
+import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
@@ -100,7 +102,10 @@ class Store:
         `data` may be a file, which is streamed.
         """
         check_key(key)
+        target = self.local_path(key)
         with _mapped(key):
+            if target is not None and isinstance(data, Path):
+                return _copy_new(data, target)
             try:
                 # parts cannot be put create-only: S3 takes up to 5 GB in one piece
                 obstore.put(self._objects, key, data, mode="create", use_multipart=False)
@@ -111,8 +116,13 @@ class Store:
     def put(self, key: str, data: bytes | Path) -> None:
         """Create or replace an object; `data` may be a file, which is streamed."""
         check_key(key)
+        target = self.local_path(key)
         with _mapped(key):
-            obstore.put(self._objects, key, data)
+            if target is not None and isinstance(data, Path):
+                with _copied_beside(data, target) as part:
+                    part.replace(target)
+            else:
+                obstore.put(self._objects, key, data)
 
     def get(self, key: str) -> bytes:
         """All bytes of an object; raises NotFoundError."""
@@ -194,6 +204,33 @@ class Store:
         """Remove the store's folder if nothing was ever put into it."""
         if self._root is not None and self._root.is_dir():
             _remove_empty_folders(self._root)
+
+
+@contextmanager
+def _copied_beside(source: Path, target: Path) -> Iterator[Path]:
+    """A copy of `source` beside `target`, under a name that `list` leaves out; removed after.
+
+    obstore would read the whole file into memory first.
+    """
+    target.parent.mkdir(parents=True, exist_ok=True)
+    part = target.with_name(f"{target.name}#{secrets.randbits(48)}")
+    try:
+        shutil.copyfile(source, part)
+        yield part
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _copy_new(source: Path, target: Path) -> bool:
+    """Copy a file to where none is yet; False if there is one already."""
+    if target.exists():
+        return False
+    with _copied_beside(source, target) as part:
+        try:
+            target.hardlink_to(part)
+        except FileExistsError:
+            return False
+    return True
 
 
 def _remove_empty_folders(folder: Path) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from farfield_core.corridor import Corridor, Floats, Path_
-from farfield_core.ground import surfaces
+from farfield_core.ground import UPRIGHT, surfaces
 from farfield_core.scene import Bounds, PreparedScene
 
 #: metres
@@ -29,8 +29,9 @@ _LENGTH = 12
 _LINES = 48
 #: share of lines open to the sky from which a scene is taken for outdoors
 _OPEN = 0.3
-#: runs looked at closely, and points along each
-_CLOSELY = 64
+#: runs looked at closely, how many at a time, and points along each
+_CLOSELY = 2048
+_AT_ONCE = 128
 _POINTS = 49
 
 
@@ -74,7 +75,7 @@ def guess_scale(bounds: Bounds) -> Scale:
     unit = 1000.0 if height > 500 and height > 0.1 * max(width, depth) else 1.0
     across = max(min(width, depth), 0.05 * max(width, depth, height), 1e-6)
     cell = min(_CELL * unit, _CELL_SHARE * across)
-    return Scale(eye=min(_EYE * unit, max(0.75 * height, 0.1 * cell), 8 * cell), cell=cell)
+    return Scale(eye=min(_EYE * unit, 0.7 * height or cell), cell=cell)
 
 
 def _walk(scene: PreparedScene, scale: Scale) -> Floats:
@@ -83,21 +84,37 @@ def _walk(scene: PreparedScene, scale: Scale) -> Floats:
     x, z = (_lines(bounds.min[axis], bounds.max[axis], scale) for axis in (0, 2))
     grid_x, grid_z = (grid.ravel() for grid in np.meshgrid(x, z, indexing="ij"))
     floor = _floors(scene, grid_x, grid_z, scale).reshape(len(x), len(z))
-    runs = _ranked_runs(x, z, floor, scale)[:_CLOSELY]
-    if runs:
-        t = np.linspace(0, 1, _POINTS)
-        lines = np.array([a + t[:, None] * (b - a) for a, b in runs])
-        close = _floors(scene, lines[..., 0].ravel(), lines[..., 1].ravel(), scale)
-        for line, y in zip(lines, close.reshape(len(runs), -1), strict=True):
-            step = float(np.hypot(*(line[1] - line[0])))
-            # NaN compares false: a gap is not level either
-            if (np.abs(np.diff(y)) < 0.5 * step + 0.2 * scale.eye).all():
-                some = slice(None, None, 4)
-                return np.stack([line[some, 0], y[some], line[some, 1]], axis=1)
+    runs = _ranked_runs(x, z, floor, scale)
+    for first in range(0, min(len(runs), _CLOSELY), _AT_ONCE):
+        found = _first_level(scene, runs[first : first + _AT_ONCE], scale)
+        if found is not None:
+            return found
+    return _across_the_middle(bounds, floor, scale)
+
+
+def _first_level(
+    scene: PreparedScene, runs: list[tuple[Floats, Floats]], scale: Scale
+) -> Floats | None:
+    """Points (n, 3) along the first run without a gap or a step."""
+    t = np.linspace(0, 1, _POINTS)
+    lines = np.array([a + t[:, None] * (b - a) for a, b in runs])
+    floors = _floors(scene, lines[..., 0].ravel(), lines[..., 1].ravel(), scale)
+    for line, y in zip(lines, floors.reshape(len(runs), -1), strict=True):
+        step = float(np.hypot(*(line[1] - line[0])))
+        # NaN compares false: a gap is not level either
+        if (np.abs(np.diff(y)) < 0.5 * step + 0.2 * scale.eye).all():
+            some = slice(None, None, 4)
+            return np.stack([line[some, 0], y[some], line[some, 1]], axis=1)
+    return None
+
+
+def _across_the_middle(bounds: Bounds, floor: Floats, scale: Scale) -> Floats:
+    """A walk across the middle of a scene that has nowhere to walk."""
     low, high = np.array(bounds.min), np.array(bounds.max)
     middle = (low + high) / 2
+    if np.isfinite(floor).any():
+        middle[1] = np.nanmedian(floor)
     reach = min(_LENGTH * scale.cell, 0.8 * float(high[0] - low[0])) / 2
-    middle[1] = low[1]
     along = np.array([reach, 0, 0])
     return np.stack([middle - along, middle + along])
 
@@ -115,7 +132,11 @@ def _floors(scene: PreparedScene, x: Floats, z: Floats, scale: Scale) -> Floats:
     top[:-1] = hits.line[1:] != hits.line[:-1]
     room = np.full(len(hits.line), np.inf)
     room[:-1] = np.where(top[:-1], np.inf, hits.y[1:] - hits.y[:-1])
-    floors = hits.walkable & (room > 1.3 * scale.eye)
+    # the undersides of solids face down; a model wound the wrong way round has nothing else
+    flat = hits.up > UPRIGHT
+    if not flat.any():
+        flat = hits.up < -UPRIGHT
+    floors = flat & (room > 1.1 * scale.eye)
     open_floors = floors & top
     if open_floors.sum() > _OPEN * len(x) and not _are_roofs(open_floors, floors):
         floors = open_floors
@@ -137,6 +158,8 @@ def _ranked_runs(x: Floats, z: Floats, floor: Floats, scale: Scale) -> list[tupl
     found: list[tuple[float, Floats, Floats]] = []
     for di, dk in ((1, 0), (0, 1), (1, 1), (1, -1)):
         step = float(np.hypot(di * (x[1] - x[0]), dk * (z[1] - z[0])))
+        if step == 0:  # a scene without any width
+            continue
         steps = max(1, int(np.ceil(_LENGTH * scale.cell / step)))
         for i in range(len(x)):
             for k in range(len(z)):

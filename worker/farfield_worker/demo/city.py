@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from farfield_worker.demo.glb import GlbWriter, Primitive
-from farfield_worker.demo.land import EXTENT
+from farfield_worker.demo.land import EXTENT, land_tint
 from farfield_worker.demo.lighting import HeightMap
 from farfield_worker.demo.looks import Material
 from farfield_worker.demo.parts import City, build, select
@@ -195,8 +195,12 @@ def _colors(
 ) -> NDArray[np.uint8]:
     """Tint times a cloudy variation times baked light, (n, 4) uint8, linear."""
     color = table.tint[row].copy()
-    cards = table.kind[row] == Kind.CARD
-    other = np.flatnonzero(~cards)
+    land = np.flatnonzero(table.kind[row] == Kind.LAND)
+    color[land] = land_tint(positions[land], normals[land, 1])
+    water = np.flatnonzero(table.material[row] == Material.WATER)
+    if len(water):
+        color[water] = _water_tint(light, positions[water])
+    other = np.flatnonzero(table.kind[row] != Kind.CARD)
     cloud = unevenness(positions[other] * 0.11)[:, 0] * 0.06
     color[other] *= (0.97 + cloud)[:, None]
     color[other] *= light.factors(positions[other], normals[other])
@@ -205,8 +209,16 @@ def _colors(
     return out
 
 
+def _water_tint(light: HeightMap, p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Greener in canals and near the shore, streaked far out, (n, 3) float, linear."""
+    near = light.wide.ravel()[light.metres(p[:, 0], p[:, 2])].astype(np.float64)
+    shallow = np.clip(near / 0.9, 0, 1)[:, None]
+    streaks = 0.84 + 0.16 * unevenness(p * 0.033)[:, :1]
+    return (1 - shallow) * streaks + shallow * np.array((0.62, 0.80, 0.66))
+
+
 def _png(image: NDArray[np.uint8], material: Material) -> bytes:
     buffer = io.BytesIO()
     pixels = image if material == Material.FOLIAGE else image[..., :3]
-    Image.fromarray(np.ascontiguousarray(pixels)).save(buffer, "PNG", compress_level=6)
+    Image.fromarray(np.ascontiguousarray(pixels)).save(buffer, "PNG", compress_level=2)
     return buffer.getvalue()

@@ -13,15 +13,15 @@ EXTENT = 675.0
 SHORE = 575.0
 #: x, z, height, reach of single mountains
 PEAKS = (
-    (455.0, -640.0, 150.0, 250.0),
-    (660.0, -500.0, 185.0, 230.0),
-    (-610.0, -610.0, 120.0, 260.0),
-    (-660.0, 120.0, 70.0, 200.0),
-    (640.0, 560.0, 105.0, 250.0),
-    (-560.0, 650.0, 95.0, 240.0),
-    (120.0, -690.0, 62.0, 210.0),
-    (690.0, 60.0, 58.0, 190.0),
-    (-180.0, 700.0, 52.0, 180.0),
+    (430.0, -700.0, 105.0, 330.0),
+    (690.0, -470.0, 150.0, 330.0),
+    (-640.0, -640.0, 80.0, 340.0),
+    (-690.0, 150.0, 42.0, 260.0),
+    (680.0, 600.0, 70.0, 320.0),
+    (-600.0, 690.0, 60.0, 320.0),
+    (90.0, -720.0, 40.0, 280.0),
+    (720.0, 60.0, 36.0, 260.0),
+    (-180.0, 720.0, 34.0, 260.0),
 )
 
 
@@ -50,12 +50,28 @@ def land_height(x: Floats, z: Floats) -> Floats:
     out = reach - SHORE * 0.97 - 14.0 * _wave((x - 1.7 * z) / 340.0) - 9.0 * _wave((z + x) / 210.0)
     rise = np.maximum(out, 0.0)
     ripples = _ripples(x, z)
-    hills = rise * 0.08 + rise * rise * 0.0011 * (1.0 + 0.55 * ripples) + 0.6 * ripples * (rise > 0)
+    hills = rise * 0.07 + rise * rise * 0.0006 * (1.0 + 0.6 * ripples) + 0.6 * ripples * (rise > 0)
     fade = np.minimum(rise / 45.0, 1.0)
     for px, pz, height, width in PEAKS:
         d = np.sqrt((x - px) * (x - px) + (z - pz) * (z - pz)) / width
         cone = np.maximum(1.0 - d, 0.0)
         # a volcano's flank grows steeper towards its top
         lift = height * cone * cone * (1.0 + 0.6 * cone) / 1.6
-        hills = hills + lift * fade * (1.0 + 0.12 * ripples)
+        hills = hills + lift * fade * (1.0 + 0.2 * ripples)
     return np.where(out > 0, 0.35 * np.minimum(rise, 2.0) + hills, np.maximum(out * 0.12, -1.6))
+
+
+def land_tint(p: Floats, up: Floats) -> Floats:
+    """Linear colour of the land at points p, (n, 3) float; `up`: y of the normals, (n,) float."""
+    x, y, z = p[:, 0], p[:, 1], p[:, 2]
+    ripples = _ripples(2.1 * z, 2.3 * x)
+    wood = np.clip(0.5 + 0.9 * ripples, 0, 1)[:, None]
+    color = np.array((0.40, 0.45, 0.17)) * (1 - wood) + np.array((0.17, 0.26, 0.09)) * wood
+    dry = np.clip(_ripples(3.7 * x, 3.1 * z) * 1.2, 0, 1)[:, None] * 0.7
+    color = color * (1 - dry) + np.array((0.62, 0.5, 0.26)) * dry
+    rock = np.clip((0.86 - up) * 6.0 + (y - 105.0) / 50.0, 0, 1)[:, None]
+    color = color * (1 - rock) + np.array((0.44, 0.38, 0.33)) * rock
+    snow = np.clip((y - 138.0 - 22.0 * ripples) / 10.0, 0, 1)[:, None]
+    color = color * (1 - snow) + np.array((1.0, 1.0, 1.0)) * snow
+    sand = np.clip(1.0 - (y - 0.2) / 1.3, 0, 1)[:, None]
+    return np.asarray(color * (1 - sand) + np.array((0.75, 0.62, 0.42)) * sand)

@@ -43,10 +43,11 @@ class Ground(IntEnum):
     CAUSEWAY = 8
     CHINAMPA = 9
     GARDEN = 10
+    LANE = 11
 
 
 #: height of each class above the lake, metres
-HEIGHTS = (0.0, 0.0, 1.2, 1.3, 2.0, 1.5, 1.25, 1.2, 1.6, 0.55, 1.25)
+HEIGHTS = (0.0, 0.0, 1.2, 1.3, 2.0, 1.5, 1.2, 1.2, 1.6, 0.55, 1.2, 1.3)
 
 
 class Rect(NamedTuple):
@@ -129,6 +130,11 @@ class Layout:
         x0, z0, x1, z1 = (round(c) + HALF for c in area)
         self.classes[max(z0, 0) : max(z1, 0), max(x0, 0) : max(x1, 0)] = ground
 
+    def wet(self, area: Rect) -> bool:
+        """Is the middle of an area water?"""
+        x, z = (area.x0 + area.x1) / 2, (area.z0 + area.z1) / 2
+        return bool(self.classes[int(z) + HALF, int(x) + HALF] <= Ground.CANAL)
+
     def cover(self, area: Rect) -> None:
         """Take away the ground where a building stands on whole cells."""
         x0, z0 = np.ceil(area.x0 + 0.02), np.ceil(area.z0 + 0.02)
@@ -155,6 +161,7 @@ def plan() -> Layout:
             _divide(layout, block)
     _causeways(layout)
     _chinampas(layout)
+    layout.bridges = [b for b in layout.bridges if layout.wet(b.area)]
     return layout
 
 
@@ -226,6 +233,9 @@ def _avenues(layout: Layout) -> None:
             a, b = sorted((sign * (2 * PITCH), sign * edge))
             road = Rect(-AVENUE, a, AVENUE, b) if vertical else Rect(a, -AVENUE, b, AVENUE)
             layout.paint(road, Ground.AVENUE)
+            for lane in (-5, 4):
+                edge_line = Rect(lane, a, lane + 1, b) if vertical else Rect(a, lane, b, lane + 1)
+                layout.paint(edge_line, Ground.LANE)
             a, b = sorted((sign * start, sign * edge))
             for side in (-1, 1):
                 c, d = sorted((side * low, side * high))
@@ -271,7 +281,7 @@ def _divide(layout: Layout, block: Block) -> None:
         piece = pieces.pop()
         long_x = piece.width >= piece.depth
         extent = piece.width if long_x else piece.depth
-        if extent <= 20 or (extent <= 23 and dice.chance(0.45)):
+        if extent <= 21 or (extent <= 25 and dice.chance(0.8)):
             done.append(piece)
             continue
         cut = round(extent * dice.between(0.42, 0.58))
@@ -324,6 +334,8 @@ def _chinampas(layout: Layout) -> None:
             x, z = bi * 54.0, bj * 54.0
             dice = Dice(71, bi, bj)
             along_x = dice.chance(0.5)
+            if dice.chance(0.14):
+                continue
             count, length, width, gap = 5, 45, 7, 4
             for k in range(count):
                 o = 3 + k * (width + gap)

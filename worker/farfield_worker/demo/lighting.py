@@ -39,10 +39,11 @@ class HeightMap:
         spans = np.clip(spans, 0, _SIZE)
         for (x0, z0, x1, z1), top in zip(spans.tolist(), solids[order, 4].tolist(), strict=True):
             heights[z0:z1, x0:x1] = top  # lowest first, so the highest stays
-        self.ground = ground
+        self.low = np.ascontiguousarray(ground[::2, ::2])
         self.heights = heights
-        self.near = _blur(heights, 4)
-        self.wide = _blur(heights, 13)
+        metres = heights[::2, ::2]
+        self.near = _blur(metres, 2)
+        self.wide = _blur(metres, 6)
 
     def cells(self, x: Floats | Map, z: Floats | Map) -> NDArray[np.int64]:
         """Flat map indices of points."""
@@ -50,15 +51,21 @@ class HeightMap:
         j = np.clip((z + EXTENT) * (1 / CELL), 0, _SIZE - 1).astype(np.int64)
         return np.asarray(j * _SIZE + i)
 
+    def metres(self, x: Floats | Map, z: Floats | Map) -> NDArray[np.int64]:
+        """Flat indices of points in the blurred maps, which have cells of one metre."""
+        i = np.clip(x + EXTENT, 0, 2 * EXTENT - 1).astype(np.int64)
+        j = np.clip(z + EXTENT, 0, 2 * EXTENT - 1).astype(np.int64)
+        return np.asarray(j * int(2 * EXTENT) + i)
+
     def factors(self, positions: Floats, normals: Floats) -> NDArray[np.float32]:
         """Shadowed over unshadowed light, (n, 3) float in (0, 1]."""
         x, y, z = (positions[:, k].astype(np.float32) for k in range(3))
         nx, ny, nz = (normals[:, k].astype(np.float32) for k in range(3))
         f = np.float32
-        at = self.cells(x + nx * f(0.8), z + nz * f(0.8))
+        at = self.metres(x + nx * f(0.8), z + nz * f(0.8))
         near = np.clip((self.near.ravel()[at] - y) * f(0.30), 0, 1)
         wide = np.clip((self.wide.ravel()[at] - y) * f(0.16), 0, 1)
-        above = np.clip(y - self.ground.ravel()[at], 0, 3)
+        above = np.clip(y - self.low.ravel()[at], 0, 3)
         foot = (f(1) - above * f(1 / 3)) ** 2 * (f(1) - np.abs(ny))
         sky = f(1) - f(0.38) * near - f(0.28) * wide
         sky = sky * (f(1) - f(0.30) * foot)
@@ -92,7 +99,9 @@ def _blur(heights: Map, radius: int) -> Map:
     """Mean over squares of 2 radius + 1 cells."""
     out = heights.astype(np.float64)
     for axis in (0, 1):
-        padded = np.pad(out, [(radius + 1, radius) if a == axis else (0, 0) for a in (0, 1)], "edge")
+        padded = np.pad(
+            out, [(radius + 1, radius) if a == axis else (0, 0) for a in (0, 1)], "edge"
+        )
         total = np.cumsum(padded, axis=axis)
         high = np.take(total, np.arange(2 * radius + 1, total.shape[axis]), axis=axis)
         low = np.take(total, np.arange(0, total.shape[axis] - 2 * radius - 1), axis=axis)

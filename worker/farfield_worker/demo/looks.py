@@ -23,6 +23,7 @@ class Material(IntEnum):
     PAINT = 9
     CLOTH = 10
     DARK = 11
+    STUCCO = 12
 
 
 #: metres that one repeat of a material's texture covers
@@ -33,12 +34,13 @@ TILE = {
     Material.EARTH: 6.0,
     Material.THATCH: 2.4,
     Material.WOOD: 2.0,
-    Material.WATER: 14.0,
-    Material.GRASS: 18.0,
+    Material.WATER: 22.0,
+    Material.GRASS: 30.0,
     Material.FOLIAGE: 1.0,
     Material.PAINT: 4.0,
     Material.CLOTH: 2.0,
     Material.DARK: 1.0,
+    Material.STUCCO: 6.0,
 }
 
 
@@ -74,19 +76,20 @@ def rgb(code: str) -> Rgb:
 
 
 DARK = Look(Material.DARK, rgb("2a1f18"), grain=0.0)
-WOOD = Look(Material.WOOD, rgb("b08a62"), grain=0.35)
-OLD_WOOD = Look(Material.WOOD, rgb("8a6c50"), grain=0.35)
+WOOD = Look(Material.WOOD, rgb("dcbc92"), grain=0.35)
+OLD_WOOD = Look(Material.WOOD, rgb("a88868"), grain=0.0)
 THATCH = Look(Material.THATCH, rgb("e0c890"), grain=0.6, rough=0.03)
-STONE = Look(Material.STONE, rgb("d8cdb8"), grain=0.35, rough=0.015)
-RED_STONE = Look(Material.STONE, rgb("c98c74"), grain=0.35, rough=0.015)
-LIME = Look(Material.PLASTER, rgb("f4ecdc"), grain=0.35, rough=0.02)
-RED = Look(Material.PLASTER, rgb("b0402c"), grain=0.35, rough=0.01)
-OCHRE = Look(Material.PLASTER, rgb("d9a04a"), grain=0.35, rough=0.01)
-TURQUOISE = Look(Material.PLASTER, rgb("3f9c9a"), grain=0.35, rough=0.01)
-BLUE = Look(Material.PLASTER, rgb("3c6ea8"), grain=0.35, rough=0.01)
+STONE = Look(Material.STONE, rgb("eee2cc"), grain=0.35, rough=0.015)
+RED_STONE = Look(Material.STONE, rgb("d8947c"), grain=0.35, rough=0.015)
+ADOBE = Look(Material.PLASTER, rgb("f4ecdc"), grain=0.14)
+LIME = Look(Material.STUCCO, rgb("f8f0e0"), grain=0.2)
+RED = Look(Material.STUCCO, rgb("b0402c"), grain=0.2)
+OCHRE = Look(Material.STUCCO, rgb("d9a04a"), grain=0.2)
+TURQUOISE = Look(Material.STUCCO, rgb("46aaa6"), grain=0.2)
+BLUE = Look(Material.STUCCO, rgb("4478b4"), grain=0.2)
 PAVING = Look(Material.PAVING, rgb("dccfb6"), grain=0.5)
 EARTH = Look(Material.EARTH, rgb("d8bf98"), grain=0.5)
-CLAY = Look(Material.PLASTER, rgb("b5653c"), grain=0.0)
+CLAY = Look(Material.STUCCO, rgb("b5653c"), grain=0.0)
 
 #: house paints, the commonest first
 WALLS = tuple(

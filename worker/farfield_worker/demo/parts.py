@@ -25,15 +25,15 @@ from farfield_worker.demo.waterside import waterside
 
 Counts = NDArray[np.int64]
 
-#: part -> share of all triangles
+#: part -> share of all triangles; what one part misses its share by the later ones make good
 SHARES = {
-    "land": 0.05,
-    "water": 0.05,
-    "ground": 0.14,
-    "temples": 0.17,
-    "waterside": 0.05,
-    "houses": 0.36,
-    "plants": 0.18,
+    "temples": 0.15,
+    "plants": 0.20,
+    "houses": 0.40,
+    "waterside": 0.04,
+    "ground": 0.13,
+    "land": 0.04,
+    "water": 0.04,
 }
 
 
@@ -67,9 +67,9 @@ def select(city: City, triangles: int) -> tuple[Surfaces, Counts, Counts, dict[s
     """Surfaces that exist, their cells along u and v, and the triangles of each part."""
     chosen, us, vs = [], [], []
     counts: dict[str, int] = {}
-    debt = 0.0
+    left, shares = float(triangles), sum(SHARES.values())
     for name, share in SHARES.items():
-        wanted = share * triangles + debt
+        wanted = left * share / shares
         table = city.forest.surfaces(city.forest.level(wanted)) if name == "plants" else None
         if table is None:
             whole = city.tables[name]
@@ -80,7 +80,8 @@ def select(city: City, triangles: int) -> tuple[Surfaces, Counts, Counts, dict[s
         else:
             nu, nv = divisions(table, 1.0)
         counts[name] = int(2 * (nu * nv).sum())
-        debt = wanted - counts[name]
+        left -= counts[name]
+        shares -= share
         chosen.append(table)
         us.append(nu)
         vs.append(nv)
@@ -90,7 +91,7 @@ def select(city: City, triangles: int) -> tuple[Surfaces, Counts, Counts, dict[s
 def _level(count: Callable[[float], int], wanted: float) -> float:
     """The level at which `count` comes closest to what is wanted."""
     low, high = 0.01, 40.0
-    for _ in range(40):
+    for _ in range(28):
         middle = (low * high) ** 0.5
         if count(middle) < wanted:
             low = middle

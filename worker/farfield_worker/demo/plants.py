@@ -36,9 +36,13 @@ class Species(IntEnum):
 
 
 #: cards at level 1 of a plant of usual size
-_CARDS = np.array([46.0, 52.0, 15.0, 12.0, 3.0, 5.0, 4.0])
+_CARDS = np.array([48.0, 52.0, 18.0, 20.0, 5.0, 7.0, 6.0])
 #: fewer cards than these are drawn as crossed pictures of the whole
-_FEW = np.array([7, 7, 5, 5, 0, 0, 0])
+_FEW = np.array([5, 5, 0, 4, 0, 0, 0])
+#: never fewer cards than these
+_LEAST = np.array([0, 0, 5, 0, 1, 1, 1])
+#: half width of a picture of the whole over the radius of the crown in it
+_MARGIN = np.array([1.45, 1.12, 1.0, 1.0, 1.0, 1.0, 1.0])
 _WHOLE = np.array(
     [foliage.WILLOW, foliage.ROUND_TREE, foliage.REED, foliage.FLOWERS, 0, 0, 0], np.int64
 )
@@ -67,6 +71,7 @@ class Forest:
         height: (n,) float, metres; for crops the height of a row.
         spread: (n,) float, radius of the crown; for crops half the length of a row.
         turn: (n, 2) float, unit vector in x and z.
+        weight: (n,) float, cards over those of a plant in the city; 1 is usual.
         tint: (n, 3) float, linear.
     """
 
@@ -75,6 +80,7 @@ class Forest:
     height: Floats
     spread: Floats
     turn: Floats
+    weight: Floats
     tint: Floats
 
     def solids(self) -> list[tuple[float, float, float, float, float]]:
@@ -88,17 +94,24 @@ class Forest:
 
     def _cards(self, level: float) -> Counts:
         size = np.where(
-            self.species >= Species.MAIZE, self.spread / 4.0, self.spread * self.height / 16.0
+            self.species >= Species.MAIZE, self.spread / 6.0, self.spread * self.height / 16.0
         )
         size = np.where(self.species == Species.PALM, 1.0, np.clip(size, 0.3, 2.5))
         rank = uniform(131, np.arange(len(self.species)))
-        wanted = np.floor(_CARDS[self.species] * size * level + rank).astype(np.int64)
-        return np.where(wanted < _FEW[self.species], 0, np.maximum(wanted, 1))
+        wanted = _CARDS[self.species] * size * self.weight * level
+        cards = np.floor(wanted + rank).astype(np.int64)
+        few = cards < _FEW[self.species]
+        return np.where(few, 0, np.maximum(cards, _LEAST[self.species]))
+
+    def _core(self) -> Counts:
+        """Pictures of the whole in each plant: two crossed, or one that faces the lake."""
+        core = (self.species <= Species.BUSH) & (self.species != Species.PALM)
+        return np.where(core, np.where((self.weight < 0.5) | (self.species == Species.BUSH), 1, 2), 0)
 
     def _sides(self, level: float) -> Counts:
         """Sides of trunks; 0 where the picture shows the trunk."""
         trunk = (self.species <= Species.PALM) & (self._cards(level) > 0)
-        return np.where(trunk, np.clip(int(3 + 2 * level**0.5), 3, 12), 0)
+        return np.where(trunk, np.clip(int(3 + 2 * level**0.5), 5, 12), 0)
 
     def _rings(self, level: float) -> int:
         return max(1, int(1.5 * level**0.5))
@@ -106,8 +119,8 @@ class Forest:
     def count(self, level: float) -> int:
         """Triangles at `level`."""
         cards = self._cards(level)
-        whole = np.where(self.species == Species.BUSH, 2, 2)
-        total = np.where(cards == 0, whole, cards * np.where(self.species == Species.PALM, 2, 1))
+        core = np.where((self.species == Species.BUSH) & (cards > 0), 0, self._core())
+        total = core + cards * np.where(self.species == Species.PALM, 2, 1)
         return int(2 * total.sum() + 2 * (self._sides(level) * self._rings(level)).sum())
 
     def level(self, triangles: float) -> float:
@@ -124,7 +137,8 @@ class Forest:
     def surfaces(self, level: float) -> Surfaces:
         """Cards and trunks at `level`; each has the segments it needs at level 1."""
         cards = self._cards(level)
-        parts = [self._crossed(np.flatnonzero(cards == 0))]
+        core = np.where((self.species == Species.BUSH) & (cards > 0), 0, self._core())
+        parts = [self._crossed(core, level)]
         for species in Species:
             rows = np.flatnonzero((self.species == species) & (cards > 0))
             if len(rows):
@@ -134,19 +148,20 @@ class Forest:
             parts.append(self._trunks(trunks, level))
         return concatenate(parts)
 
-    def _crossed(self, rows: Counts) -> Surfaces:
-        plant = np.repeat(rows, 2)
-        k = np.tile([0, 1], len(rows))
+    def _crossed(self, core: Counts, level: float) -> Surfaces:
+        plant = np.repeat(np.arange(len(core)), core)
+        k = np.arange(len(plant)) - np.repeat(np.cumsum(core) - core, core)
         d = self.turn[plant]
         d = np.where((k == 1)[:, None], np.stack([-d[:, 1], d[:, 0]], axis=1), d)
-        wide = self.spread[plant] * 1.12
+        full = np.where(self._cards(level)[plant] > 0, 0.84, 1.0)  # twigs cover it
+        wide = self.spread[plant] * _MARGIN[self.species[plant]] * full
         side = np.stack([d[:, 0] * wide, np.zeros(len(plant)), d[:, 1] * wide], axis=1)
         up = np.zeros((len(plant), 3))
-        up[:, 1] = self.height[plant] * 0.5
+        up[:, 1] = self.height[plant] * 0.5 * (0.4 + 0.6 * full)
         middle = self.foot[plant] + up
         picture = _WHOLE[self.species[plant]]
         centre = self.foot[plant] + up * 0.9
-        return self._table(plant, middle, side, up, picture, centre, k)
+        return self._table(plant, middle, side, up, picture, centre, k, 0.86)
 
     def _leaves(self, species: int, rows: Counts, cards: Counts) -> Surfaces:
         plant = np.repeat(rows, cards)
@@ -175,9 +190,9 @@ class Forest:
         centre = self.foot[plant].copy()
         centre[:, 1] += h * mid * 0.85
         # cards cover about three times the crown's outline, however many there are
-        area = 3.4 * w * h * half * 2 / n
+        area = 2.6 * w * h * half * 2 / n
         size = np.sqrt(area) * (0.75 + 0.5 * r[3])
-        size = np.minimum(size, w * 1.1)
+        size = np.minimum(size, w * 0.7)
         out = np.stack([a, 0.55 * b, c], axis=1)
         lean = np.stack([r[4] - 0.5, r[5] - 0.5, r[2] - 0.5], axis=1)
         normal = _unit(out + 0.9 * lean)
@@ -260,15 +275,15 @@ class Forest:
         shape[:, 0, 1] -= 0.2
         palm = self.species[rows] == Species.PALM
         broad = self.species[rows] == Species.BROAD
-        shape[:, 1, 0] = np.where(palm, 0.2, 0.035 * self.height[rows] + 0.02)
-        part = np.where(palm, 1.0, np.where(broad, 0.6, 0.7))
+        shape[:, 1, 0] = np.where(palm, 0.2, 0.024 * self.height[rows] + 0.03)
+        part = np.where(palm, 1.0, np.where(broad, 0.42, 0.3))
         shape[:, 1, 1] = self.height[rows] * part + 0.25
         shape[:, 1, 2] = 5
         uv = np.zeros((n, 3, 2))
         uv[:, 1, 0] = 0.5
         uv[:, 2, 1] = 1.5
         uv = uv[:, :, ::-1].copy()  # bark runs up the trunk
-        sides = np.clip(int(3 + 2 * level**0.5), 3, 12)
+        sides = np.clip(int(3 + 2 * level**0.5), 5, 12)
         return Surfaces(
             kind=np.full(n, Kind.LATHE, np.uint8),
             shape=shape,
@@ -351,12 +366,12 @@ def plant(layout: Layout) -> Forest:
     wet = layout.classes
 
     def grow(species: int, x: float, y: float, z: float, h: float, w: float, dice: Dice,
-             along: tuple[float, float] | None = None) -> None:
+             along: tuple[float, float] | None = None, weight: float = 1.0) -> None:
         a = dice.between(-1, 1)
         turn = along or (a, (1 - a * a) ** 0.5)
         warm = dice.between(0.85, 1.15)
         tone = dice.between(0.78, 1.05)
-        rows.append((species, x, y, z, h, w, *turn, min(tone * warm, 1.2), tone, tone * 0.9))
+        rows.append((species, x, y, z, h, w, *turn, weight, min(tone * warm, 1.2), tone, tone * 0.9))
 
     _avenue_trees(grow)
     for k, strip in enumerate(layout.chinampas):
@@ -365,7 +380,7 @@ def plant(layout: Layout) -> Forest:
     _shore(grow)
     t = np.array(rows)
     return Forest(
-        t[:, 0].astype(np.int64), t[:, 1:4], t[:, 4], t[:, 5], t[:, 6:8], linear(t[:, 8:11])
+        t[:, 0].astype(np.int64), t[:, 1:4], t[:, 4], t[:, 5], t[:, 6:8], t[:, 8], linear(t[:, 9:12])
     )
 
 
@@ -393,12 +408,11 @@ def _garden_bed(grow, strip, dice: Dice) -> None:  # type: ignore[no-untyped-def
     wide = min(strip.width, strip.depth)
     crop = dice.pick((Species.MAIZE, Species.MAIZE, Species.FLOWERS, Species.FLOWERS))
     tall = dice.between(1.6, 2.1) if crop == Species.MAIZE else dice.between(0.45, 0.8)
-    bed = 4
-    sections = 5
+    bed, sections = 3, 2
     for r in range(bed):
         o = (r + 0.5) / bed * (wide - 1.4) + 0.7
         for q in range(sections):
-            if dice.chance(0.05):
+            if dice.chance(0.04):
                 continue
             m = 2.5 + (q + 0.5) * (length - 5.0) / sections
             half = (length - 5.0) / sections / 2 * 0.97
@@ -416,14 +430,16 @@ def _garden_bed(grow, strip, dice: Dice) -> None:  # type: ignore[no-untyped-def
 
 def _scattered(grow, classes: NDArray[np.uint8]) -> None:  # type: ignore[no-untyped-def]
     """Trees and bushes in courts and gardens."""
-    for k in range(26000):
-        dice = Dice(181, k)
-        x, z = dice.between(-340, 340), dice.between(-340, 340)
-        i, j = int(x + HALF), int(z + HALF)
-        around = classes[j - 1 : j + 2, i - 1 : i + 2]
-        kind = int(classes[j, i])
-        if (around != kind).any():
-            continue
+    spots = -340 + 680 * uniform(182, np.arange(26000)[:, None], np.arange(2)[None])
+    i, j = (spots + HALF).astype(np.int64).T
+    kinds = classes[j, i]
+    clear = (kinds > Ground.CANAL) & (kinds != Ground.BUILT)
+    for a, b in ((-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, 1), (-1, 1), (1, -1)):
+        clear &= classes[j + a, i + b] == kinds
+    for k in np.flatnonzero(clear):
+        dice = Dice(181, int(k))
+        x, z = float(spots[k, 0]), float(spots[k, 1])
+        kind = int(kinds[k])
         y = HEIGHTS[kind] - 0.02
         if kind == Ground.COURT and dice.chance(0.16):
             _court_plant(grow, x, y, z, dice)
@@ -438,7 +454,7 @@ def _court_plant(grow, x: float, y: float, z: float, dice: Dice) -> None:  # typ
     if kind <= 2:
         h = dice.between(4.5, 8.0)
         grow(Species.BROAD, x, y, z, h, h * dice.between(0.3, 0.4), dice)
-    elif kind == 3:
+    elif kind == 3 and dice.chance(0.6):
         grow(Species.PALM, x, y, z, dice.between(5.5, 9.0), dice.between(2.2, 2.9), dice)
     elif kind <= 7:
         h = dice.between(0.9, 1.8)
@@ -448,18 +464,27 @@ def _court_plant(grow, x: float, y: float, z: float, dice: Dice) -> None:  # typ
 
 
 def _shore(grow) -> None:  # type: ignore[no-untyped-def]
-    """Woods and reeds on the land around the lake."""
-    for k in range(1500):
+    """Woods and reeds on the land around the lake, each picture facing the city."""
+    for k in range(680):
         dice = Dice(191, k)
-        x, z = dice.between(-660, 660), dice.between(-660, 660)
-        y = float(land_height(np.array([x]), np.array([z]))[0])
-        if not 0.15 < y < 75 or (abs(x) < 12 or abs(z) < 12):
+        x, z = dice.between(-655, 655), dice.between(-655, 655)
+        if x * x + z * z < 540 * 540:
             continue
-        if y < 0.6 and dice.chance(0.6):
-            grow(Species.AGAVE, x, y - 0.05, z, dice.between(1.2, 2.2), dice.between(0.9, 1.4), dice)
-        elif dice.chance(0.75):
-            h = dice.between(5.0, 9.5)
-            grow(Species.BROAD, x, y - 0.1, z, h, h * dice.between(0.32, 0.45), dice)
-        else:
-            h = dice.between(7.0, 12.0)
-            grow(Species.WILLOW, x, y - 0.1, z, h, h * dice.between(0.18, 0.24), dice)
+        count = dice.whole(1, 5)
+        xs = np.array([x + dice.between(-9, 9) for _ in range(count)])
+        zs = np.array([z + dice.between(-9, 9) for _ in range(count)])
+        spots = zip(xs.tolist(), land_height(xs, zs).tolist(), zs.tolist(), strict=True)
+        for px, y, pz in spots:
+            if not 0.1 < y < 80 or abs(px) < 12 or abs(pz) < 12:
+                continue
+            r = (px * px + pz * pz) ** 0.5
+            across = (-pz / r, px / r)
+            if y < 0.5:
+                h, w = dice.between(1.0, 1.8), dice.between(0.9, 1.3)
+                grow(Species.AGAVE, px, y - 0.1, pz, h, w, dice, across, 0.3)
+            elif dice.chance(0.8):
+                h = dice.between(5.0, 9.5)
+                grow(Species.BROAD, px, y - 0.2, pz, h, h * dice.between(0.32, 0.45), dice, across, 0.3)
+            else:
+                h = dice.between(7.0, 12.0)
+                grow(Species.WILLOW, px, y - 0.2, pz, h, h * dice.between(0.18, 0.24), dice, across, 0.3)

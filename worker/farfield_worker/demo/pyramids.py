@@ -14,6 +14,7 @@ from farfield_worker.demo.looks import (
     DARK,
     LIME,
     OCHRE,
+    OLD_WOOD,
     PAVING,
     RED,
     STONE,
@@ -26,18 +27,14 @@ from farfield_worker.demo.looks import (
 from farfield_worker.demo.sketch import (
     ALWAYS,
     CLOSED,
-    EAST,
-    ENDLESS,
     NORTH,
-    SIDES,
     SOUTH,
     STANDING,
-    TOP,
-    WEST,
     Levels,
     Place,
     Sketch,
 )
+from farfield_worker.demo.surfaces import ENDLESS
 
 PAINT = Look(Material.PAINT, rgb("ffffff"), grain=0.3)
 
@@ -77,39 +74,43 @@ def around(at: Place, quarter: int, half: tuple[float, float]) -> tuple[Place, f
 def pyramid(s: Sketch, at: Place, p: Pyramid, dice: Dice) -> None:
     """Build one pyramid with everything on it."""
     rise = p.height / p.tiers
-    setback = rise * 0.34
-    lean = rise * 0.16
+    setback, lean = rise * 0.34, rise * 0.16
     hx, hz = p.half_width, p.half_depth
     for k in range(p.tiers):
         y = k * rise
-        wall = p.wall.shaded(1.0 - 0.03 * (k % 2))
+        wall = p.wall.shaded(1.0 - 0.04 * (k % 2))
         s.box((-hx, y - 0.3, -hz), (hx, y + rise, hz), wall, at=at, taper=lean, top=PAVING,
               solid=True)
-        _tier_trim(s, at, hx - lean, hz - lean, y + rise, rise, p, k)
+        _panel(s, at, hx - lean * 0.55, hz - lean * 0.55, y + rise, rise, p, k)
         _bosses(s, at, hx, hz, y, rise, lean, wall, dice)
         hx, hz = hx - lean - setback, hz - lean - setback
     top_x, top_z = hx + setback, hz + setback
-    _stairs(s, at, p, hz)
+    _stairs(s, at, p, top_z + 0.45 * lean + 0.75)
     _crown(s, at, p, top_x, top_z, dice)
 
 
-def _tier_trim(
+def _panel(
     s: Sketch, at: Place, hx: float, hz: float, y: float, rise: float, p: Pyramid, k: int
 ) -> None:
-    """Cornice and painted panel along the top of a tier."""
-    tall = min(0.9, rise * 0.22)
-    s.box((-hx - 0.28, y - tall, -hz - 0.28), (hx + 0.28, y + 0.12, hz + 0.28), LIME, at=at,
-          top=PAVING, faces=CLOSED, levels=(0.25 + 0.03 * k, ENDLESS))
+    """The upright panel over the slope of a tier (talud and tablero), framed and painted."""
+    tall = rise * 0.45
+    edge = min(0.3, tall * 0.16)
+    foot = y - tall
+    s.box((-hx - 0.1, foot, -hz - 0.1), (hx + 0.1, y + 0.1, hz + 0.1), LIME.shaded(0.94), at=at,
+          top=PAVING, faces=CLOSED)
+    level = 0.12 + 0.02 * k
+    for low, high in ((foot - 0.05, foot + edge), (y + 0.1 - edge, y + 0.16)):
+        s.box((-hx - 0.3, low, -hz - 0.3), (hx + 0.3, high, hz + 0.3), LIME, at=at, top=PAVING,
+              faces=CLOSED, levels=(level, ENDLESS))
+    row = (STEPPED_FRET, DISKS)[k % 2]
     for quarter in range(4):
         frame, half, reach = around(at, quarter, (hx, hz))
-        gap = p.stair_half + 1.2 if quarter == 0 else 0.0
-        spans = [(-half + 0.5, -gap), (gap, half - 0.5)] if gap else [(-half + 0.5, half - 0.5)]
+        gap = p.stair_half + 0.8 if quarter == 0 else 0.0
+        spans = [(-half + 0.2, -gap), (gap, half - 0.2)] if gap else [(-half + 0.2, half - 0.2)]
         for a, b in spans:
-            if b - a < 1.5:
-                continue
-            row = (STEPPED_FRET, DISKS)[k % 2]
-            frieze(s, frame, a, b, y - tall + 0.08, reach + 0.34, tall - 0.08, row,
-                   levels=(0.35 + 0.05 * k, ENDLESS))
+            if b - a > 1.5:
+                frieze(s, frame, a, b, foot + edge, reach + 0.16, tall - 2 * edge + 0.1, row,
+                       levels=(level, ENDLESS))
 
 
 def _bosses(
@@ -124,7 +125,7 @@ def _bosses(
             for k in range(count):
                 level = dice.between(0.7, 2.6)
                 t = (row + dice.between(0.2, 0.7)) * 2.2 / rise
-                if t > 0.72:
+                if t > 0.5:
                     continue
                 x = (k + dice.between(0.25, 0.75)) / count * 2 * half - half
                 if abs(x) > half - lean - 0.6:
@@ -136,10 +137,9 @@ def _bosses(
                       faces=CLOSED & ~NORTH, levels=(level, ENDLESS))
 
 
-def _stairs(s: Sketch, at: Place, p: Pyramid, top_z: float) -> None:
+def _stairs(s: Sketch, at: Place, p: Pyramid, back: float) -> None:
     """Flights from the foot to the platform, with balustrades; coarser ones at low levels."""
-    front = p.half_depth + p.height * 0.16
-    back = top_z + 0.2
+    run = p.height * 0.5
     flight = p.stair_half * 2 / p.stairs
     rail = 1.1 if p.height > 15 else 0.6
     for k in range(p.stairs):
@@ -147,37 +147,37 @@ def _stairs(s: Sketch, at: Place, p: Pyramid, top_z: float) -> None:
         x1 = x0 + flight - rail
         full = max(8, round(p.height / 0.3))
         counts = (max(4, full // 6), max(6, full // 3), full)
-        limits = (0.0, 0.3, 0.7, ENDLESS)
+        limits = (0.0, 0.22, 0.45, ENDLESS)
         for n, low, high in zip(counts, limits[:-1], limits[1:], strict=True):
             for i in range(n):
                 y0, y1 = p.height * i / n, p.height * (i + 1) / n
-                z1 = front + (back - front) * i / n
-                z2 = front + (back - front) * (i + 1) / n
-                tone = STONE.shaded(1.02 if i % 2 else 0.96)._replace(rough=0.0)
+                z1, z2 = back + run * (1 - i / n), back + run * (1 - (i + 1) / n)
+                z2 -= 2.0 if i == n - 1 else 0.0
+                y1 += 0.2 if i == n - 1 else 0.0
+                tone = STONE.shaded(1.02 if i % 2 else 0.95)._replace(rough=0.0)
                 s.quad(((x0, y0, z1), (x1, y0, z1), (x1, y1, z1), (x0, y1, z1)), tone, at=at,
                        levels=(low, high))
                 s.quad(((x0, y1, z1), (x1, y1, z1), (x1, y1, z2), (x0, y1, z2)), PAVING, at=at,
                        levels=(low, high))
     for k in range(p.stairs + 1):
         x = -p.stair_half + k * flight
-        a, b = x - rail * 0.5, x + rail * 0.5
-        _balustrade(s, at, a, b, front, back, p.height)
+        _balustrade(s, at, x - rail * 0.5, x + rail * 0.5, back, run, p.height)
 
 
 def _balustrade(
-    s: Sketch, at: Place, a: float, b: float, front: float, back: float, height: float
+    s: Sketch, at: Place, a: float, b: float, back: float, run: float, height: float
 ) -> None:
-    """A sloping wall beside a flight, with an upright block at its top and a serpent's head below."""
-    up = 0.9
-    z0, z1 = front + 0.6, back + height * 0.06
-    y0, y1 = up, height * 0.9
+    """A sloping wall beside a flight, an upright block at its top, a serpent's head at its foot."""
+    up = 0.85
+    z0, z1 = back + run + 0.5, back + run * 0.12 + 0.5
+    y1 = height * 0.88 + up
     look = LIME.shaded(0.95)
     foot = -0.3
-    s.quad(((a, y0, z0), (b, y0, z0), (b, y1, z1), (a, y1, z1)), look, at=at)
-    s.quad(((b, foot, z0), (b, foot, z1), (b, y1, z1), (b, y0, z0)), look, at=at)
-    s.quad(((a, foot, z1), (a, foot, z0), (a, y0, z0), (a, y1, z1)), look, at=at)
-    s.quad(((a, foot, z0), (b, foot, z0), (b, y0, z0), (a, y0, z0)), look, at=at)
-    s.box((a - 0.05, height * 0.8, back - 0.2), (b + 0.05, height + 0.5, z1 + 0.1), look, at=at)
+    s.quad(((a, up, z0), (b, up, z0), (b, y1, z1), (a, y1, z1)), look, at=at)
+    s.quad(((b, foot, z0), (b, foot, z1), (b, y1, z1), (b, up, z0)), look, at=at)
+    s.quad(((a, foot, z1), (a, foot, z0), (a, up, z0), (a, y1, z1)), look, at=at)
+    s.quad(((a, foot, z0), (b, foot, z0), (b, up, z0), (a, up, z0)), look, at=at)
+    s.box((a - 0.06, height * 0.7, back - 2.0), (b + 0.06, height + 0.9, z1 + 0.1), look, at=at)
     if height < 8:
         return
     w = (b - a) / 2
@@ -206,21 +206,22 @@ def _crown(s: Sketch, at: Place, p: Pyramid, hx: float, hz: float, dice: Dice) -
         x = -hx + (k + 0.5) * room
         w = room * 0.40
         d = hz * 0.52
-        shrine(s, top, x, -hz + d + 0.7, w, d, p.height * (0.34 if p.height > 20 else 0.5), paint,
+        shrine(s, top, x, -hz + d + 0.7, w, d, p.height * (0.44 if p.height > 20 else 0.55), paint,
                row, style)
         stone = Place(top.x, top.y, top.z, top.quarter)
         s.box((x - 0.4, -0.1, hz * 0.35), (x + 0.4, 0.8, hz * 0.35 + 0.6), STONE, at=stone,
               levels=(0.5, ENDLESS))
-    for x in (-hx + 1.0, hx - 1.0):
-        brazier(s, top, x, hz - 1.0, 0.55 if p.height > 15 else 0.35)
+    for x in (-hx + 0.8, hx - 0.8):
+        if hx - 0.8 > p.stair_half + 1.0:
+            brazier(s, top, x, hz - 0.8, 0.55 if p.height > 15 else 0.35)
 
 
 def brazier(s: Sketch, at: Place, x: float, z: float, r: float) -> None:
     """A stone bowl with a fire."""
     s.lathe((x, -0.05, z), r, r * 2.2, 4, STONE.shaded(0.85)._replace(rough=0.0), at=at, sides=8,
-            rings=4, levels=(0.4, ENDLESS))
+            rings=4, levels=(0.2, ENDLESS))
     s.lathe((x, r * 1.9, z), r * 0.7, r * 2.4, 6, Look(Material.PLASTER, rgb("ff9a2e")), at=at,
-            sides=6, rings=3, levels=(0.55, ENDLESS))
+            sides=6, rings=3, levels=(0.25, ENDLESS))
 
 
 def shrine(
@@ -247,10 +248,9 @@ def shrine(
     s.box((-w - 0.35, body - 0.05, -d - 0.35), (w + 0.35, body + 0.5, d + 0.35), LIME, at=here,
           faces=CLOSED)
     s.box((-w, body + 0.4, -d), (w, body + roof, d), paint, at=here, taper=lean)
-    t = 0.5
     for quarter in range(4):
         frame, half, reach = around(here, quarter, (w, d))
-        z1 = reach - lean * (0.16 / 1) + 0.12
+        z1 = reach + 0.06
         band = min(1.6, roof * 0.3)
         frieze(s, frame, -half + lean * 0.4, half - lean * 0.4, body + 0.62, z1 + 0.02, band, row,
                levels=(0.2, ENDLESS))
@@ -258,7 +258,6 @@ def shrine(
     s.box((-w + lean - 0.2, top - 0.1, -d + lean - 0.2), (w - lean + 0.2, top + 0.45, d - lean + 0.2),
           LIME, at=here, faces=CLOSED)
     crest(s, here, w - lean, d - lean, top + 0.44, 0.9 if tall > 9 else 0.6, style)
-    del t
 
 
 def crest(
@@ -280,5 +279,17 @@ def crest(
                       LIME, at=frame, levels=(0.6, ENDLESS))
 
 
-__all__ = ["Pyramid", "around", "brazier", "crest", "frieze", "pyramid", "shrine"]
-_ = (SIDES, EAST, WEST, TOP)
+def banner(s: Sketch, at: Place, tall: float, dice: Dice) -> None:
+    """A pole with a long flag of cloth and feathers."""
+    s.box((-0.5, -0.1, -0.5), (0.5, 0.5, 0.5), STONE, at=at, levels=(0.4, ENDLESS))
+    s.box((-0.09, 0, -0.09), (0.09, tall, 0.09), OLD_WOOD, at=at, levels=(0.15, ENDLESS))
+    s.box((-0.05, tall - 0.2, -0.06), (1.5, tall - 0.08, 0.06), OLD_WOOD, at=at, faces=CLOSED,
+          levels=(0.6, ENDLESS))
+    cloth = Look(Material.CLOTH, dice.pick((rgb("c8382c"), rgb("2f8f94"), rgb("e0a030"))), grain=0.8)
+    drop = tall * 0.5
+    s.quad(((0.12, tall - drop, 0.0), (1.4, tall - drop, 0.1), (1.4, tall - 0.14, 0.0),
+            (0.12, tall - 0.14, 0.0)), cloth, at=at, uv=(0, 1, 2.0, 0), sag=(0.0, 0.0, 0.35),
+           levels=(0.15, ENDLESS))
+
+
+__all__ = ["Pyramid", "around", "banner", "brazier", "crest", "frieze", "pyramid", "shrine"]

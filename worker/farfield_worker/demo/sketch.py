@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from farfield_worker.demo.hashing import uniform
-from farfield_worker.demo.looks import TILE, Look
+from farfield_worker.demo.looks import TILE, Look, Material
 from farfield_worker.demo.surfaces import ENDLESS, Floats, Kind, Surfaces, concatenate, linear
 
 Point = tuple[float, float, float]
@@ -45,6 +45,16 @@ class Place:
 ORIGIN = Place()
 
 
+def turned_faces(faces: int, quarter: int) -> int:
+    """Faces of a box after quarter turns: south becomes east, east north, north west."""
+    for _ in range(quarter):
+        moved = faces & (TOP | BOTTOM)
+        for before, after in ((EAST, NORTH), (NORTH, WEST), (WEST, SOUTH), (SOUTH, EAST)):
+            moved |= after if faces & before else 0
+        faces = moved
+    return faces
+
+
 class Sketch:
     """Collects shapes; `surfaces()` turns them into a table.
 
@@ -79,11 +89,7 @@ class Sketch:
         tx, tz = (taper, taper) if isinstance(taper, float | int) else taper
         if at.quarter % 2:
             tx, tz = tz, tx
-        for _ in range(at.quarter):  # east -> north -> west -> south
-            e, w, s, n = faces & EAST, faces & WEST, faces & SOUTH, faces & NORTH
-            rest = faces & (TOP | BOTTOM)
-            faces = rest | (NORTH if e else 0) | (SOUTH if w else 0) | (EAST if s else 0)
-            faces |= WEST if n else 0
+        faces = turned_faces(faces, at.quarter)
         lid = top or look
         self._boxes.append(
             (x0 + ax, z0 + az, y0, y1, ax, az, ax - tx, az - tz, *turn)
@@ -155,15 +161,16 @@ class Sketch:
         look: Look,
         *,
         segments: tuple[float, float] = (6.0, 4.0),
-        draught: float = 0.28,
-        rise: float = 0.3,
+        draught: float = 0.5,
+        rise: float = 0.22,
+        levels: Levels = ALWAYS,
     ) -> None:
         """Add a boat of half length vector `along` (x, z) and half width `width`."""
         length = (along[0] * along[0] + along[1] * along[1]) ** 0.5
         half = (-along[1] / length * width, 0.0, along[0] / length * width)
         points = (middle, (along[0], 0.0, along[1]), half, (draught, rise, 0.0))
         uv = (0.0, length, 0.0, 0.6)
-        self._shape(Kind.HULL, points, (0.0,) * 3, look, uv, ALWAYS, segments)
+        self._shape(Kind.HULL, points, (0.0,) * 3, look, uv, levels, segments)
 
     def has_content(self) -> bool:
         """Was anything added?"""
@@ -235,6 +242,9 @@ def _box_faces(b: Floats, seed: int) -> Surfaces:
             uv[:, 0, 1] = shift[keep, 1] - k[:, 2] / tile
             uv[:, 1, 0] = length[keep, u] / tile
             uv[:, 2, 1] = -length[keep, v] / tile
+            # the grain of wood runs along posts
+            upright = (material == Material.WOOD) & (length[keep, v] > length[keep, u])
+            uv[upright] = uv[upright][:, :, ::-1]
         grain = k[:, 19 if lid else 18]
         out.append(
             Surfaces(

@@ -23,17 +23,18 @@ from farfield_worker.demo.looks import (
     Material,
     rgb,
 )
-from farfield_worker.demo.pyramids import Pyramid, brazier, crest, frieze, pyramid
+from farfield_worker.demo.pyramids import Pyramid, banner, brazier, crest, frieze, pyramid
 from farfield_worker.demo.sketch import (
     CLOSED,
-    ENDLESS,
     NORTH,
     SOUTH,
     STANDING,
     Place,
     Sketch,
 )
+from farfield_worker.demo.surfaces import ENDLESS
 
+ROOF = LIME.tinted(*rgb("e8d8b8"))
 PLAZA = HEIGHTS[Ground.PLAZA]
 
 
@@ -52,20 +53,21 @@ def _stand(layout: Layout, x: float, z: float, hx: float, hz: float) -> None:
 
 def _precinct(s: Sketch, layout: Layout) -> None:
     dice = Dice(90)
-    great = Pyramid(40.0, 36.0, 31.5, 5, 15.0, 2, STONE.tinted(*rgb("e0d2b8")), stairs=2)
+    great = Pyramid(40.0, 34.0, 30.0, 5, 15.0, 2, STONE.tinted(*rgb("f6e6c8")), stairs=2)
     s.box((-50, PLAZA - 0.5, -96), (50, PLAZA + 2.6, -8), STONE, top=PAVING, taper=0.6, solid=True)
     for k, (y, z) in enumerate(((0.65, -5.2), (1.3, -5.9), (1.95, -6.6), (2.6, -7.3))):
-        s.box((-22, PLAZA - 0.3, -8.4), (22, PLAZA + y - 0.03, z + 0.7), LIME.shaded(0.95 + 0.01 * k),
-              top=PAVING)
+        half = 22 - 0.05 * k
+        s.box((-half, PLAZA - 0.3, -8.4), (half, PLAZA + y - 0.03, z + 0.7),
+              LIME.shaded(0.95 + 0.01 * k), top=PAVING, faces=STANDING & ~NORTH)
     _stand(layout, 0, -52, 49, 43)
-    pyramid(s, Place(0.0, PLAZA + 2.6, -54.0, 0), great, dice)
+    pyramid(s, Place(0.0, PLAZA + 2.6, -55.0, 0), great, dice)
     for x, z, half, tall, tiers, quarter, wall in (
-        (-78, -70, 14, 14, 4, 1, RED_STONE),
-        (78, -70, 14, 14, 4, 3, STONE),
-        (-80, -18, 12, 10, 3, 1, STONE),
-        (80, -18, 12, 10, 3, 3, RED_STONE),
-        (-82, 28, 10, 8, 3, 1, STONE.tinted(*rgb("e8c48c"))),
-        (82, 28, 10, 8, 3, 3, STONE),
+        (-78, -70, 14.0, 14.0, 4, 1, RED_STONE),
+        (78, -70, 14.0, 14.0, 4, 3, STONE),
+        (-80, -18, 12.0, 10.0, 3, 1, STONE),
+        (80, -18, 12.0, 10.0, 3, 3, RED_STONE),
+        (-82, 28, 10.0, 8.0, 3, 1, STONE.tinted(*rgb("f0cc94"))),
+        (82, 28, 10.0, 8.0, 3, 3, STONE),
     ):
         p = Pyramid(half, half, tall, tiers, half * 0.42, 1, wall)
         pyramid(s, Place(x, PLAZA, z, quarter), p, Dice(93, x, z))
@@ -86,19 +88,6 @@ def _precinct(s: Sketch, layout: Layout) -> None:
             banner(s, Place(x, PLAZA, z, 0), 9.0, dice)
 
 
-def banner(s: Sketch, at: Place, tall: float, dice: Dice) -> None:
-    """A pole with a long flag of cloth and feathers."""
-    s.box((-0.5, -0.1, -0.5), (0.5, 0.5, 0.5), STONE, at=at, levels=(0.4, ENDLESS))
-    s.box((-0.09, 0, -0.09), (0.09, tall, 0.09), OLD_WOOD, at=at, levels=(0.15, ENDLESS))
-    s.box((-0.05, tall - 0.2, -0.06), (1.5, tall - 0.08, 0.06), OLD_WOOD, at=at, faces=CLOSED,
-          levels=(0.6, ENDLESS))
-    cloth = Look(Material.CLOTH, dice.pick((rgb("c8382c"), rgb("2f8f94"), rgb("e0a030"))), grain=0.8)
-    drop = tall * 0.5
-    s.quad(((0.12, tall - drop, 0.0), (1.4, tall - drop, 0.1), (1.4, tall - 0.14, 0.0),
-            (0.12, tall - 0.14, 0.0)), cloth, at=at, uv=(0, 1, 2.0, 0), sag=(0.0, 0.0, 0.35),
-           levels=(0.15, ENDLESS))
-
-
 def _walls(s: Sketch, dice: Dice) -> None:
     """The serpent wall with merlons and four gates."""
     at = [Place(0.0, PLAZA, 0.0, q) for q in range(4)]
@@ -109,7 +98,7 @@ def _walls(s: Sketch, dice: Dice) -> None:
                 a, b = (a + 1.6 if a < -20 else a), (b - 1.6 if b > 20 else b)
             s.box((a, -1.2, reach - 1.6), (b, tall, reach), STONE.tinted(*rgb("d9c6a2")), at=frame,
                   solid=True)
-            s.box((a, tall - 0.7, reach - 1.7), (b, tall + 0.25, reach + 0.14), LIME, at=frame,
+            s.box((a + 0.05, tall - 0.7, reach - 1.7), (b - 0.05, tall + 0.25, reach + 0.14), LIME, at=frame,
                   faces=CLOSED, levels=(0.25, ENDLESS))
             frieze(s, frame, a + 0.3, b - 0.3, tall - 0.62, reach + 0.2, 0.75, STEPPED_FRET,
                    levels=(0.35, ENDLESS))
@@ -125,6 +114,10 @@ def _walls(s: Sketch, dice: Dice) -> None:
                 s.box((x - 0.5, 0.9, reach - 0.1), (x + 0.5, 1.7, reach + 0.3),
                       TURQUOISE.shaded(0.85), at=frame, taper=(0.2, 0.1),
                       levels=(dice.between(0.5, 1.2), ENDLESS))
+        for rise, run in ((-0.27, 1.6), (-0.53, 2.2)):
+            half = gate + 0.05 * run
+            s.box((-half, -1.0, reach + 1.0), (half, rise, reach + run), STONE, at=frame,
+                  top=PAVING, faces=STANDING & ~NORTH)
         for x in (-gate - 1.5, gate + 1.5):
             s.box((x - 2.2, -1.2, reach - 2.6), (x + 2.2, tall + 2.6, reach + 1.0), LIME, at=frame,
                   taper=0.2, solid=True)
@@ -153,7 +146,8 @@ def _round_temple(s: Sketch, layout: Layout, x: float, z: float) -> None:
     for i in range(n):
         y0, y1 = 7.9 * i / n, 7.9 * (i + 1) / n
         z0 = 14.6 - 8.0 * i / n
-        s.box((-2.6, y0 - 0.4, 5.0), (2.6, y1, z0), STONE.shaded(1.0 if i % 2 else 0.95), at=at,
+        half = 2.6 - 0.01 * i
+        s.box((-half, y0 - 0.4, 5.0), (half, y1, z0), STONE.shaded(1.0 if i % 2 else 0.95), at=at,
               top=PAVING, faces=STANDING & ~NORTH, levels=(0.0 if i % 3 == 2 else 0.35, ENDLESS))
 
 
@@ -203,10 +197,12 @@ def _hall(s: Sketch, at: Place, w: float, d: float, tall: float, dice: Dice) -> 
     platform = 1.4
     s.box((-w - 1, -1.3, -d - 1), (w + 1, platform, d + 1), STONE, at=at, top=PAVING, taper=0.2)
     for k in range(4):
-        s.box((-4, -1.2, d), (4, platform * (k + 1) / 5, d + 2.9 - k * 0.5), LIME, at=at, top=PAVING)
+        half = 4 - 0.05 * k
+        s.box((-half, -1.2, d), (half, platform * (k + 1) / 5, d + 2.9 - k * 0.5), LIME, at=at,
+              top=PAVING, faces=STANDING & ~NORTH)
     wall = LIME.tinted(*dice.pick(WALLS[:6]))
     s.box((-w, platform - 0.1, -d), (w, platform + tall, d - 3.0), wall, at=at, solid=True)
-    s.box((-w, platform + tall * 0.74, d - 3.1), (w, platform + tall, d), wall, at=at, faces=CLOSED)
+    s.box((-w, platform + tall * 0.74, d - 3.0), (w, platform + tall, d), wall, at=at, faces=CLOSED)
     count = max(4, int(2 * w / 3.0))
     paint = (RED, TURQUOISE, OCHRE)[dice.whole(0, 2)]
     for k in range(count):
@@ -222,7 +218,7 @@ def _hall(s: Sketch, at: Place, w: float, d: float, tall: float, dice: Dice) -> 
     frieze(s, at, -w + 0.2, w - 0.2, platform + tall * 0.78, d + 0.06, tall * 0.2,
            dice.pick((DISKS, STEPPED_FRET)), levels=(0.15, ENDLESS))
     s.box((-w - 0.25, platform + tall - 0.04, -d - 0.25), (w + 0.25, platform + tall + 0.4, d + 0.25),
-          LIME.tinted(*dice.pick(BANDS)), at=at, faces=CLOSED)
+          LIME.tinted(*dice.pick(BANDS)), at=at, faces=CLOSED, top=ROOF)
     crest(s, at, w, d, platform + tall + 0.36, 0.7, dice.whole(0, 1))
 
 
@@ -234,7 +230,7 @@ def _quarter_shrine(s: Sketch, layout: Layout, area: Rect, dice: Dice) -> None:
     half = dice.between(8.5, 11.0)
     quarter = dice.whole(0, 3)
     wall = dice.pick((STONE, RED_STONE, STONE.tinted(*rgb("e6c690"))))
-    p = Pyramid(half, half, dice.between(7.5, 12.0), dice.whole(2, 4), half * 0.42, 1, wall)
+    p = Pyramid(half, half, half * dice.between(0.66, 0.88), dice.whole(2, 4), half * 0.4, 1, wall)
     back = Place(x, 0.0, z, quarter).point(0.0, 0.0, -6.0)
     pyramid(s, Place(back[0], y, back[2], quarter), p, dice)
     layout.cover(Rect(back[0] - half, back[2] - half, back[0] + half, back[2] + half))
@@ -269,7 +265,7 @@ def _palace(s: Sketch, layout: Layout, area: Rect, dice: Dice) -> None:
                 frame = Place(cx, y + 1.0, cz, quarter)
                 inward = frame.point(0.0, 0.0, reach)
                 # halls open to the court
-                hall = Place(inward[0], y + 1.0, inward[2], (quarter + 2) % 4)
+                hall = Place(inward[0], y + 1.0 + 0.04 * (quarter % 2), inward[2], (quarter + 2) % 4)
                 tall = dice.between(5.0, 6.0) + (2.5 if quarter == 0 else 0.0)
                 _hall(s, hall, along, deep - 0.4, tall, dice)
                 _outer_face(s, hall, along, deep - 0.4, tall, dice)

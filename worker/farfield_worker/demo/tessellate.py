@@ -45,7 +45,7 @@ class Mesh(NamedTuple):
 
 def divisions(table: Surfaces, level: float) -> tuple[Counts, Counts]:
     """Cells along u and v of every surface at `level`; zero where it does not exist there."""
-    least = np.where(table.kind == Kind.LATHE, 3, np.where(table.kind == Kind.HULL, 2, 1))
+    least = np.where(table.kind == Kind.LATHE, 5, np.where(table.kind == Kind.HULL, 2, 1))
     nu = np.maximum(np.floor(table.segments[:, 0] * level + table.rank[:, 0]), least)
     nv = np.maximum(np.floor(table.segments[:, 1] * level + table.rank[:, 1]), 1)
     nv = np.where(table.kind == Kind.HULL, np.maximum(nv, 2), nv)
@@ -154,12 +154,13 @@ def _lathe(shape: Floats, u: Floats, v: Floats) -> Floats:
 def _hull(shape: Floats, u: Floats, v: Floats) -> Floats:
     draught, rise = shape[:, 3, 0], shape[:, 3, 1]
     along, across = 2 * u - 1, 2 * v - 1
+    along = along * (1.5 - 0.5 * along * along)  # closer together towards the ends
     end = along * along
     half = np.sqrt(np.maximum(1 - end * end, 0.0)) * 0.97 + 0.03
     keel = -draught * (1 - across * across) * half
     sheer = rise * (0.6 + 0.9 * end * end)
     out = shape[:, 0] + shape[:, 1] * along[:, None] + shape[:, 2] * (across * half)[:, None]
-    out[:, 1] += keel + sheer
+    out[:, 1] += np.maximum(keel, -draught * 0.9) + sheer
     return np.asarray(out)
 
 

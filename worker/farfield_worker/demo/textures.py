@@ -30,6 +30,7 @@ def textures() -> dict[Material, Image]:
         Material.WATER: water,
         Material.GRASS: grass,
         Material.CLOTH: cloth,
+        Material.STUCCO: stucco,
     }
     out = {material: _bytes(draw()) for material, draw in drawn.items()}
     out[Material.FOLIAGE] = foliage()
@@ -81,9 +82,9 @@ def plaster() -> Floats:
     streaks = cloudy(24, 3, 3, 110)
     grain = noise(128, 128, 120)
     color = _mix((0.86, 0.83, 0.78), (1.0, 0.985, 0.95), blotches)
-    color = color * (1 - 0.14 * _smooth(streaks, 0.55, 0.8))[..., None]
-    worn = _smooth(cloudy(5, 5, 4, 130), 0.66, 0.72)
-    color = _mix(color, _mix((0.66, 0.5, 0.36), (0.76, 0.62, 0.47), grain), 0.75 * worn)
+    color = color * (1 - 0.12 * _smooth(streaks, 0.55, 0.8))[..., None]
+    worn = _smooth(cloudy(3, 3, 6, 132), 0.66, 0.72) * _smooth(cloudy(24, 24, 3, 135), 0.25, 0.55)
+    color = _mix(color, _mix((0.66, 0.5, 0.36), (0.76, 0.62, 0.47), grain), 0.5 * worn)
     return color * (0.96 + 0.06 * grain)[..., None]
 
 
@@ -178,26 +179,33 @@ def wood() -> Floats:
     return color * (0.35 + 0.65 * _smooth(gap, 0.01, 0.06))[..., None]
 
 
+def stucco() -> Floats:
+    """Painted or burnished lime: faint clouds and brush strokes."""
+    color = np.ones((SIZE, SIZE, 3)) * (0.88 + 0.12 * cloudy(3, 3, 6, 140))[..., None]
+    strokes = noise(64, 6, 150)
+    return color * (0.95 + 0.07 * strokes)[..., None] * np.array((1.0, 0.99, 0.97))
+
+
 def water() -> Floats:
     """Quiet water: the sky in its ripples."""
     swell = cloudy(3, 5, 4, 700)
-    ripple = cloudy(10, 26, 3, 710)
-    fine = noise(48, 120, 720)
-    color = _mix((0.13, 0.29, 0.34), (0.24, 0.43, 0.5), swell)
-    color = _mix(color, (0.5, 0.66, 0.74), 0.75 * _smooth(ripple, 0.52, 0.78))
-    color = _mix(color, (0.86, 0.93, 0.95), 0.7 * _smooth(ripple * 0.7 + fine * 0.3, 0.7, 0.8))
+    ripple = cloudy(12, 36, 3, 710)
+    fine = noise(64, 160, 720)
+    color = _mix((0.15, 0.34, 0.4), (0.24, 0.45, 0.53), swell)
+    color = _mix(color, (0.46, 0.64, 0.74), 0.7 * _smooth(ripple, 0.5, 0.76))
+    color = _mix(color, (0.78, 0.88, 0.93), 0.6 * _smooth(ripple * 0.65 + fine * 0.35, 0.7, 0.82))
     return color * (0.94 + 0.1 * fine)[..., None]
 
 
 def grass() -> Floats:
-    """Hillside: grass, dry spots, dark bushes."""
-    base = cloudy(6, 6, 6, 800)
+    """Growth on a slope, pale so that its tint decides: tufts, dry spots, dark bushes."""
+    base = cloudy(7, 7, 6, 800)
     blades = noise(170, 170, 810)
-    color = _mix((0.36, 0.42, 0.2), (0.66, 0.66, 0.36), base)
-    color = _mix(color, (0.78, 0.68, 0.45), 0.7 * _smooth(cloudy(4, 4, 5, 820), 0.55, 0.7))
-    bushes = _smooth(cloudy(14, 14, 3, 830), 0.6, 0.68)
-    color = _mix(color, (0.2, 0.28, 0.13), 0.75 * bushes)
-    return color * (0.82 + 0.3 * blades)[..., None]
+    color = _mix((0.66, 0.72, 0.52), (0.95, 0.95, 0.8), base)
+    color = _mix(color, (1.0, 0.93, 0.74), 0.5 * _smooth(cloudy(5, 5, 5, 820), 0.5, 0.7))
+    bushes = _smooth(cloudy(24, 24, 4, 830), 0.58, 0.68)
+    color = _mix(color, (0.42, 0.52, 0.34), 0.5 * bushes)
+    return color * (0.8 + 0.28 * blades)[..., None]
 
 
 def cloth() -> Floats:

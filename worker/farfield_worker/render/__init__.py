@@ -16,6 +16,11 @@ def open_renderer(name: Literal["moderngl", "pyrender"], scene: PreparedScene) -
 
     Call it in the process that draws, never before a fork.
     """
+    # Each is imported only when asked for: pyrender is slow to import and changes the environment.
+    if name == "pyrender":
+        from farfield_worker.render.pyrender_renderer import PyrenderRenderer  # noqa: PLC0415
+
+        return PyrenderRenderer(scene)
     from farfield_worker.render.culled import CulledRenderer  # noqa: PLC0415
 
     return CulledRenderer(scene)

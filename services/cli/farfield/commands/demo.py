@@ -59,16 +59,14 @@ def command(
     """
     wanted = None if corridor is None else read_corridor(corridor)
     api = ApiSettings.from_environment(os.environ, store=store, jobs=jobs)
+    server = Server(host, port)
     service = create_service(api)
-    server = Server(create_app(api, service), host, port)
     try:
-        server.start()
-        bake = _begin(service, scene, wanted, detail, settings)
-        _watch(service, bake, f"{server.address}/walk/{bake}")
+        with server.beside(create_app(api, service)):
+            bake = _begin(service, scene, wanted, detail, settings)
+            _watch(service, bake, f"{server.address}/walk/{bake}")
     except KeyboardInterrupt:
         click.echo("Stopped; run the same command again to go on.", err=True)
-    finally:
-        server.stop()
 
 
 def _begin(

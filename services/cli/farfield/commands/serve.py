@@ -19,6 +19,6 @@ from farfield.server import Server
 def command(store: str, host: str, port: int, jobs: int | None) -> None:
     """Serve the API, the pages and baking; everything else is set by FARFIELD_* variables."""
     settings = ApiSettings.from_environment(os.environ, store=store, jobs=jobs)
-    server = Server(create_app(settings), host, port)
+    server = Server(host, port)
     click.echo(f"Farfield serves {settings.store} at {server.address}", err=True)
-    server.run()
+    server.run(create_app(settings))

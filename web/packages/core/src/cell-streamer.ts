@@ -1,6 +1,7 @@
 /**
  * Decides which cells to load, keep and show. Knows nothing of engines: `load` makes something
- * that can be shown out of a cell, and a cell exists here only when it is complete.
+ * that can be shown out of a cell, and a cell exists here only when it is complete. A load must let
+ * go of all it holds as soon as its signal aborts.
  */
 
 import type { Cell } from './cells.js';
@@ -108,12 +109,15 @@ export class CellStreamer<V> {
     return state === 'ready' ? this.complete.size : this.loading.size;
   }
 
-  /** Complete cells that are not further down the order than the prefetch reaches. */
+  /** Whether nothing is being loaded. */
   get idle(): boolean {
     return this.loading.size === 0;
   }
 
-  /** Drop the least useful complete cell that matters less than `priority`; false if none does. */
+  /**
+   * Give up the least useful cell that matters less than `priority`, complete or loading; false if
+   * there is none. What is shown or wanted stays.
+   */
   evict(priority: number): boolean {
     let worst: Complete<V> | undefined;
     for (const candidate of this.complete.values()) {
@@ -122,8 +126,16 @@ export class CellStreamer<V> {
       if (this.rankOf(name) <= priority) continue;
       if (worst === undefined || this.lessUseful(candidate, worst)) worst = candidate;
     }
-    if (worst === undefined) return false;
-    this.drop(worst);
+    const last = [...this.loading.keys()].sort((a, b) => this.rankOf(b) - this.rankOf(a)).at(0);
+    const lastRank = last === undefined ? -1 : this.rankOf(last);
+    if (worst !== undefined && this.rankOf(worst.cell.name) >= lastRank) {
+      this.drop(worst);
+      return true;
+    }
+    if (last === undefined || lastRank <= priority) return false;
+    this.loading.get(last)?.abort();
+    this.loading.delete(last);
+    this.full = Math.min(this.full, lastRank);
     return true;
   }
 
@@ -197,7 +209,12 @@ export class CellStreamer<V> {
         continue;
       }
       if (rank >= this.full || (rank > 0 && this.loading.size >= concurrency)) return;
-      if (now < (this.trouble.get(cell.name)?.retryAt ?? 0)) continue;
+      const trouble = this.trouble.get(cell.name);
+      if (now < (trouble?.retryAt ?? 0)) {
+        // Neighbours would only take the memory that the walker's own cell lacks.
+        if (rank === 0 && isTooLarge(trouble?.error)) return;
+        continue;
+      }
       void this.start(cell);
       if (rank === 0) return;
     }
@@ -240,12 +257,11 @@ export class CellStreamer<V> {
 
   private note(cell: Cell, error: Error): void {
     const rank = this.rankOf(cell.name);
-    const code = error instanceof FarfieldError ? error.code : undefined;
-    if (code === 'too-large' && rank > 0) {
+    if (isTooLarge(error) && rank > 0) {
       this.full = Math.min(this.full, rank);
       return;
     }
-    const absent = code === 'not-found';
+    const absent = error instanceof FarfieldError && error.code === 'not-found';
     const attempts = (this.trouble.get(cell.name)?.attempts ?? 0) + 1;
     const wait = absent
       ? Math.min(15_000, 1000 * 1.5 ** attempts)
@@ -264,6 +280,10 @@ export class CellStreamer<V> {
     this.bytes -= complete.bytes;
     this.options.dispose(complete.view);
   }
+}
+
+function isTooLarge(error: Error | undefined): boolean {
+  return error instanceof FarfieldError && error.code === 'too-large';
 }
 
 /** How far around the walker cells are looked at: a cell and a half, more at speed. */

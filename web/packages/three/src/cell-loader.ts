@@ -63,6 +63,8 @@ export class CellLoader {
     job.signal.throwIfAborted();
     const held: (() => void)[] = [];
     const release = (): void => held.splice(0).forEach((free) => free());
+    // At once, not when the load notices: another cell may be waiting for this memory.
+    job.signal.addEventListener('abort', release, { once: true });
     try {
       const view = await this.build(cell, job, held, release);
       return { view, bytes: view.bytes };
@@ -73,6 +75,8 @@ export class CellLoader {
         throw new FarfieldError('network', `A part of the cell is missing. ${error.message}`);
       }
       throw error;
+    } finally {
+      job.signal.removeEventListener('abort', release);
     }
   }
 

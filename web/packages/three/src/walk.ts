@@ -259,13 +259,15 @@ export class Walk extends EventDispatcher<WalkEvents> {
 
   private readonly onContextLost = (event: Event): void => {
     event.preventDefault();
+    // Everything on the graphics card is gone, and can only be let go of before a new context comes.
+    this.stage?.dispose();
+    this.stage = undefined;
+    this.view = undefined;
+    this.shown = undefined;
     this.dispatchEvent({ type: 'context-lost' });
   };
 
   private readonly onContextRestored = (): void => {
-    this.stage?.dispose();
-    this.view = undefined;
-    this.shown = undefined;
     this.build();
     this.dispatchEvent({ type: 'context-restored' });
   };
