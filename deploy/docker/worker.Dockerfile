@@ -1,5 +1,7 @@
 # A farm worker: Python, Mesa's EGL and glvnd, no root. On NVIDIA hosts the container runtime adds the driver.
 FROM python:3.11-slim AS packages
+# meshoptimizer comes as source only and is compiled.
+RUN apt-get update && apt-get install -y --no-install-recommends g++
 RUN pip install --no-cache-dir uv==0.13.9
 WORKDIR /build
 COPY requirements.lock ./

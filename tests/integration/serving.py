@@ -48,7 +48,7 @@ def client_over(folder: Path, **how: Any) -> Iterator[TestClient]:
 
 def until(condition: Callable[[], Any]) -> Any:
     """Wait until something is true, and return it."""
-    end = time.monotonic() + 30
+    end = time.monotonic() + 120
     while not (value := condition()):
         assert time.monotonic() < end, "waited in vain"
         time.sleep(0.02)
