@@ -100,6 +100,18 @@ class Bounds(_Model):
     max: Triple
 
 
+class MapView(_Model):
+    """The top view: which rectangle of the ground it shows. Columns run along +x, rows along +z."""
+
+    file: str
+    width: int
+    height: int
+    #: x and z of the picture's upper left corner, scene coordinates
+    min: tuple[float, float]
+    #: x and z of its lower right corner
+    max: tuple[float, float]
+
+
 class SceneInfo(_Model):
     """scene.json."""
 
@@ -113,6 +125,8 @@ class SceneInfo(_Model):
     textures: tuple[Texture, ...]
     batches: tuple[Batch, ...]
     blocks: tuple[Block, ...]
+    #: absent where the machine that prepared the scene could not draw
+    map: MapView | None = None
     #: what was left out or guessed while reading, a sentence each
     notes: tuple[str, ...] = ()
 
@@ -144,7 +158,11 @@ def open_scene(folder: Path) -> PreparedScene:
         text = (folder / "scene.json").read_text(encoding="utf-8")
     except FileNotFoundError:
         raise NotFoundError(f"There is no prepared scene in {folder}; prepare it first.") from None
-    info = SceneInfo.model_validate_json(text)
+    return map_scene(folder, SceneInfo.model_validate_json(text))
+
+
+def map_scene(folder: Path, info: SceneInfo) -> PreparedScene:
+    """Map the arrays in `folder`, which `info` describes."""
     arrays: dict[str, Any] = {
         name: np.load(folder / f"{name}.npy", mmap_mode="r") for name in ARRAYS
     }

@@ -1,0 +1,93 @@
+"""A small writer of binary glTF 2.0 (specification, section 4.4); equal content, equal bytes."""
+
+from __future__ import annotations
+
+import json
+import struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
+_COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
+_SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+
+
+class GlbWriter:
+    """Collects buffer views and accessors, then writes one GLB with them and `extra` JSON."""
+
+    def __init__(self) -> None:
+        self._views: list[dict[str, Any]] = []
+        self._accessors: list[dict[str, Any]] = []
+        self._body = bytearray()
+
+    def add(
+        self,
+        array: NDArray[Any],
+        target: int,
+        *,
+        normalized: bool = False,
+        bounds: bool = False,
+    ) -> int:
+        """Append (n, k) data as a buffer view with one accessor; returns the accessor.
+
+        Rows of vertex data are padded to a multiple of four bytes, as the specification demands.
+        """
+        rows = np.ascontiguousarray(array).reshape(len(array), -1)
+        row = rows.dtype.itemsize * rows.shape[1]
+        view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self._body)}
+        if target == ARRAY_BUFFER:
+            stride = -(-row // 4) * 4
+            padded = np.zeros((len(rows), stride), np.uint8)
+            padded[:, :row] = rows.view(np.uint8)
+            data = padded.tobytes()
+            view["byteStride"] = stride
+        else:
+            data = rows.tobytes()
+        view |= {"byteLength": len(data), "target": target}
+        self._body += data + bytes(-len(data) % 4)
+        accessor: dict[str, Any] = {
+            "bufferView": len(self._views),
+            "componentType": _COMPONENTS[rows.dtype.str[1:]],
+            "count": len(rows),
+            "type": _SHAPES[rows.shape[1]],
+        }
+        if normalized:
+            accessor["normalized"] = True
+        if bounds:
+            accessor["min"] = rows.min(axis=0).tolist()
+            accessor["max"] = rows.max(axis=0).tolist()
+        self._views.append(view)
+        self._accessors.append(accessor)
+        return len(self._accessors) - 1
+
+    def add_range(self, array: NDArray[Any], cuts: list[tuple[int, int]]) -> list[int]:
+        """Append one index buffer; returns an accessor for each (first, count) in `cuts`."""
+        whole = self.add(array.reshape(-1, 1), ELEMENT_ARRAY_BUFFER)
+        base = self._accessors.pop()
+        for first, count in cuts:
+            start = first * array.dtype.itemsize
+            self._accessors.append(base | {"byteOffset": start, "count": count})
+        return list(range(whole, whole + len(cuts)))
+
+    def finish(self, extra: dict[str, Any]) -> bytes:
+        """Return the file; `extra` holds every member of the root but buffers and accessors."""
+        root = {
+            "asset": {"version": "2.0", "generator": "farfield"},
+            "buffers": [{"byteLength": len(self._body)}],
+            "bufferViews": self._views,
+            "accessors": self._accessors,
+        } | extra
+        text = json.dumps(root, separators=(",", ":"), sort_keys=True).encode()
+        text += b" " * (-len(text) % 4)
+        total = 12 + 8 + len(text) + 8 + len(self._body)
+        return b"".join(
+            [
+                struct.pack("<4sII", b"glTF", 2, total),
+                struct.pack("<I4s", len(text), b"JSON"),
+                text,
+                struct.pack("<I4s", len(self._body), b"BIN\0"),
+                bytes(self._body),
+            ]
+        )
