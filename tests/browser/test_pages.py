@@ -66,12 +66,10 @@ def test_figures_are_those_of_the_cell(visit: Visit, server: WalkServer) -> None
     visit.open(f"{server.url}/walk/room")
     panel = visit.page.get_by_label("Figures", exact=True).last
     panel.get_by_text("Near triangles").wait_for()
-    rows = dict(
-        zip(
-            panel.locator("dt").all_inner_texts(),
-            panel.locator("dd").all_inner_texts(),
-            strict=True,
-        )
+    # In one go, since rows come and go while something loads.
+    rows = panel.evaluate(
+        "panel => Object.fromEntries([...panel.querySelectorAll('dl > div')]"
+        ".map(row => [...row.children].map(cell => cell.textContent)))"
     )
     stats = visit.call("return farfield.stats")
     assert rows["Cell"] == "0 · 0 · 0"

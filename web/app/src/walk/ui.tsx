@@ -43,9 +43,11 @@ export function Interface({ session }: { session: Session }): JSX.Element {
       {panel && state.phase === 'walking' ? <Readout state={state} /> : null}
       {state.phase === 'walking' ? null : <Opening state={state} />}
       <Thumb session={session} />
-      <p class="remark" role="status" data-shown={remark !== undefined}>
-        {remark ?? ''}
-      </p>
+      {state.phase === 'walking' ? (
+        <p class="remark" role="status" data-shown={remark !== undefined}>
+          {remark ?? ''}
+        </p>
+      ) : null}
       {state.phase === 'walking' && !help ? <Hint /> : null}
       {help ? <Help close={() => setHelp(false)} flying={state.flying} /> : null}
     </>
@@ -71,8 +73,8 @@ export function Problem({ title, text }: { title: string; text: string }): JSX.E
 function Opening({ state }: { state: ViewState }): JSX.Element {
   return (
     <div class="center quiet" role="status">
-      <div class="spinner" aria-hidden="true" />
-      <p>
+      <p class="waiting">
+        <span class="spinner" aria-hidden="true" />
         {state.phase === 'opening' ? 'Opening the walk…' : (state.remark ?? 'Loading the view…')}
       </p>
     </div>
