@@ -106,5 +106,5 @@ def to_float(array: NDArray[Any], normalized: bool) -> NDArray[np.float32]:
     if normalized and array.dtype.kind in "iu":
         out = out / np.float32(np.iinfo(array.dtype).max)
         if array.dtype.kind == "i":
-            np.maximum(out, -1, out)
+            np.maximum(out, -1, out=out)
     return out
