@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from farfield_core.faces import texel_centres
+from farfield_core.faces import directions, texel_centres
 from numpy.typing import NDArray
 
 from farfield_worker.slanted.clip import (
@@ -84,14 +84,11 @@ def face_quads(
     sheets = sheets._replace(owner=owner)
     if least > 1:
         sheets = _drop(sheets, least)
-        owner = sheets.owner
     low2, high2 = tolerance.interval(disparity, 2.0)
     starts = texel_starts(fragments.texel, resolution)
     texels = fill(sheets, starts, disparity, low2, high2, resolution)
     nearest, farthest = disparity_range(texels, disparity, seed, triangles, tolerance, resolution)
-    drawn = np.einsum("ij,ij->i", sheets.plane[owner], np.stack([u, v, np.ones_like(u)], axis=1))
-    dips = np.zeros(len(sheets.rect), np.bool_)
-    dips[owner[(owner >= 0) & inside(drawn, u, v, walls)]] = True
+    dips = _dips(sheets, u, v, walls)
     sheet, polygons, planes = [], [], []
     for s, plane in enumerate(sheets.plane):
         rectangle = grown_rectangle(texels.rect[s])
@@ -113,10 +110,29 @@ def face_quads(
     )
 
 
+def _dips(sheets: Sheets, u: Floats, v: Floats, walls: Floats) -> NDArray[np.bool_]:
+    """Sheets that draw a captured fragment, seen at (u, v) (n,), (n,), in the near field: (s,)."""
+    dips = np.zeros(len(sheets.rect), np.bool_)
+    captured = np.flatnonzero(sheets.owner >= 0)
+    owner = sheets.owner[captured]
+    a, b, c = sheets.plane[owner].T
+    within = inside(a * u[captured] + b * v[captured] + c, u[captured], v[captured], walls)
+    dips[owner[within]] = True
+    return dips
+
+
 def texel_uv(texel: Ints, resolution: int) -> tuple[Floats, Floats]:
     """Face coordinates of the centres of `texel` (n,): (n,), (n,) float."""
     centres = texel_centres(resolution)
     return centres[texel % resolution], centres[texel // resolution]
+
+
+def texel_points(
+    face: int, texel: Ints, disparity: NDArray[np.floating], resolution: int
+) -> Floats:
+    """Points seen at `texel` (n,) of `face` with `disparity` (n,), relative to the eye: (n, 3)."""
+    u, v = texel_uv(texel, resolution)
+    return directions(face, u, v) / disparity.astype(np.float64)[:, None]
 
 
 def sheet_images(

@@ -55,6 +55,8 @@ class DepthMap(NamedTuple):
 class MapSource(Protocol):
     """Whatever makes depth maps."""
 
+    resolution: int
+
     def map(self, eye: Floats, face: int) -> DepthMap:
         """Depth map of `face` of `eye` (3,), scene coordinates."""
         ...
@@ -124,6 +126,7 @@ class MapCache:
 
     def __init__(self, source: MapSource, capacity: int = 64) -> None:
         self.source = source
+        self.resolution = source.resolution
         self.capacity = capacity
         self.made = 0
         self._maps: OrderedDict[tuple[int, int, int, int], DepthMap] = OrderedDict()
