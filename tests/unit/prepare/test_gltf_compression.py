@@ -174,7 +174,13 @@ def test_damaged_draco_is_refused(tmp_path):
 
 @pytest.mark.parametrize(
     ("dtype", "normalized", "steps"),
-    [("i1", False, 100), ("u1", True, 255), ("i2", False, 3000), ("u2", True, 65535), ("i2", True, 32767)],
+    [
+        ("i1", False, 100),
+        ("u1", True, 255),
+        ("i2", False, 3000),
+        ("u2", True, 65535),
+        ("i2", True, 32767),
+    ],
 )
 def test_quantised_positions(tmp_path, dtype, normalized, steps):
     gltf = Gltf()

@@ -83,9 +83,7 @@ def test_trees_agree_with_trimesh(tmp_path, nodes):
     mesh = gltf.mesh({"attributes": {"POSITION": gltf.accessor(CORNER)}})
     for n, (translation, rotation, scale, parent) in enumerate(nodes):
         unit = (np.array(rotation) / np.linalg.norm(rotation)).tolist()
-        gltf.node(
-            top=parent >= n, mesh=mesh, translation=translation, rotation=unit, scale=scale
-        )
+        gltf.node(top=parent >= n, mesh=mesh, translation=translation, rotation=unit, scale=scale)
         if parent < n:
             gltf.root["nodes"][parent].setdefault("children", []).append(n)
     ours = soup(prepared(gltf, tmp_path)).positions
