@@ -1,0 +1,1 @@
+"""OpenGL that the bake's renderers and `farfield shoot` share: context, textures, materials."""

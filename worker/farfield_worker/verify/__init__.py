@@ -1,0 +1,1 @@
+"""How good is a walk: its pictures against full renders (docs/quality.md)."""
