@@ -15,7 +15,7 @@ from PIL import Image
 from tests.unit.raycast import JITTER
 from tests.unit.scenes import checkerboard
 from tests.unit.test_shoot_scene import rays, sky
-from tests.unit.walks import WalkWriter, cast_quads, near_glb
+from tests.unit.walk_writer import WalkWriter, cast_quads, near_glb
 
 pytestmark = pytest.mark.usefixtures("graphics")
 

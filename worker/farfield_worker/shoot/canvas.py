@@ -20,10 +20,12 @@ uniform vec3 up;
 uniform vec3 forward;
 uniform float focal;
 uniform float near;
+uniform vec2 jitter;
 
 vec4 clip_point(vec3 q, float w) {
   float z = dot(q, forward);
-  return vec4(focal * dot(q, right), focal * dot(q, up), near * w + 1e-9 * z, z);
+  vec2 p = vec2(dot(q, right), dot(q, up));
+  return vec4(focal * p + jitter * z, near * w + 1e-9 * z, z);
 }
 """
 
@@ -42,11 +44,13 @@ uniform vec3 right;
 uniform vec3 up;
 uniform vec3 forward;
 uniform float focal;
+uniform vec2 jitter;
 out vec3 direction;
 
 void main() {
   vec2 corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
-  direction = corner.x / focal * right + corner.y / focal * up + forward;
+  vec2 at = (corner - jitter) / focal;
+  direction = at.x * right + at.y * up + forward;
   gl_Position = vec4(corner, 0.0, 1.0);
 }
 """
@@ -120,5 +124,7 @@ def camera(view: View, near: float) -> dict[str, Any]:
         "forward": tuple(forward),
         "focal": view.focal,
         "near": near if view.near is None else view.near,
+        # the scene moves against the samples: left and up
+        "jitter": (-2 * view.jitter[0] / view.size, 2 * view.jitter[1] / view.size),
         "top": float(view.size),
     }

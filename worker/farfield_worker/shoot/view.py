@@ -24,6 +24,7 @@ class View:
         fov: horizontal and vertical angle of view, degrees.
         size: pixels across.
         near: near clip, metres; None leaves it to what is shot.
+        jitter: by how many pixels (x, y) samples lie right of and below the pixels' centres.
     """
 
     eye: tuple[float, float, float]
@@ -32,6 +33,7 @@ class View:
     fov: float = 60.0
     size: int = 512
     near: float | None = None
+    jitter: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         """Refuse what no camera can be; raises BadInputError."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,10 @@ class WalkShooter:
             self._near.draw(uniforms, eye, self.walk.near_field)
             self._quads.draw(uniforms, eye)
             return self._canvas.end()
+
+    def baked(self) -> Iterator[CellFile]:
+        """Every cell that exists, from the walk's start on."""
+        return self._files.baked()
 
     def _load(self, view: View, wanted: Index | None) -> None:
         """Make the cell to draw the loaded one."""

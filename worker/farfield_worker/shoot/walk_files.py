@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import TypeVar
 
@@ -69,6 +70,12 @@ class WalkFiles:
                 heapq.heappush(waiting, ranked)
         while waiting:
             yield heapq.heappop(waiting)[1]
+
+    def baked(self) -> Iterator[CellFile]:
+        """Every cell that exists, from the walk's start on."""
+        for index in self.nearest(np.array(self.walk.start.eye)):
+            with suppress(NotFoundError):
+                yield self.cell(index)
 
     def _model(self, model: type[Model], key: str) -> Model:
         try:

@@ -1,0 +1,1 @@
+"""Slanted quads: far geometry as textured quads on planes of affine disparity."""

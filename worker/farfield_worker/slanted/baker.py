@@ -1,0 +1,198 @@
+"""One view cell as slanted quads: A-buffer, visibility, sheets, quads, residuals (design, section 3).
+
+Its inputs are numbers and a scene, its output quads with their pictures; packing, encoding and the
+cell file are those of the layer bake.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from farfield_core.scene import PreparedScene
+from numpy.typing import NDArray
+
+from farfield_worker.slanted.abuffer import ABuffer
+from farfield_worker.slanted.fragments import Fragments
+from farfield_worker.slanted.near_border import walls
+from farfield_worker.slanted.painter import QuadPainter
+from farfield_worker.slanted.planes import seeds
+from farfield_worker.slanted.quads import face_quads, texel_points
+from farfield_worker.slanted.residual import EyeQuads, residual_quads
+from farfield_worker.slanted.segment import SegmentSettings
+from farfield_worker.slanted.tolerance import DEFAULT_FACTOR, Tolerance
+from farfield_worker.visibility.depth_maps import DepthMapRenderer, MapCache
+from farfield_worker.visibility.from_region import cell_eyes, seen
+from farfield_worker.visibility.spread import spread
+
+Floats = NDArray[np.float64]
+
+_CORNERS = slice(1, 9)
+
+
+@dataclass(frozen=True)
+class SlantedSettings:
+    """What a slanted bake may be asked for.
+
+    Attributes:
+        half_extents: (3,) half the cell's edge lengths, metres.
+        near: half width of the near field, metres.
+        alpha: parallax bound, radians.
+        resolution: texels across a face.
+        tolerance: share of the bound that sheets use.
+        faces: faces to bake.
+        visibility: whether to leave out what no eye in the cell can see.
+        spread: texels by which what is seen is taken further along its surface.
+        residual: whether to add quads of the cell's corners.
+        segment: knobs of the segmentation.
+    """
+
+    half_extents: tuple[float, float, float]
+    near: float
+    alpha: float
+    resolution: int
+    tolerance: float = DEFAULT_FACTOR
+    faces: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
+    visibility: bool = True
+    spread: int = 2
+    residual: bool = True
+    segment: SegmentSettings = SegmentSettings()
+
+
+@dataclass
+class SlantedCell:
+    """The quads of a cell and how they came about.
+
+    Attributes:
+        parts: quads by eye and face, eyes relative to the cell's centre; the centre's come first.
+        fragments, seen: fragments in all A-buffers, and of those the ones that some eye can see.
+        seconds: time spent by stage.
+    """
+
+    parts: list[EyeQuads]
+    fragments: int
+    seen: int
+    seconds: dict[str, float]
+
+
+class SlantedBaker:
+    """Bakes cells of one scene. Create it in the process that uses it, never before a fork."""
+
+    def __init__(self, scene: PreparedScene, resolution: int, cache: int = 160) -> None:
+        self.scene = scene
+        self.resolution = resolution
+        self._abuffer = ABuffer(scene)
+        self._renderer = DepthMapRenderer(scene, resolution)
+        self.maps = MapCache(self._renderer, cache)
+        self._painter = QuadPainter(resolution)
+
+    def cell(self, centre: Sequence[float] | Floats, settings: SlantedSettings) -> SlantedCell:
+        """Quads of the cell around `centre` (3,), scene coordinates."""
+        c = np.asarray(centre, np.float64)
+        cell = SlantedCell([], 0, 0, {})
+        clock = _Clock(cell.seconds)
+        fragments = {
+            face: self._abuffer.fragments(c, face, settings.near, self.resolution)
+            for face in settings.faces
+        }
+        cell.fragments = sum(len(f.texel) for f in fragments.values())
+        clock.lap("abuffer")
+        if settings.visibility:
+            fragments = self._visible(c, fragments, settings)
+        cell.seen = sum(len(f.texel) for f in fragments.values())
+        clock.lap("visibility")
+        self._painter.clear()
+        for face, here in fragments.items():
+            if len(here.texel):
+                part = self._centre_quads(c, face, here, settings)
+                cell.parts.append(part)
+                self._painter.add(part.face, part.eye, part.quads)
+        clock.lap("sheets")
+        if settings.residual:
+            cell.parts += residual_quads(
+                self.scene,
+                self.maps,
+                self._painter,
+                c,
+                np.asarray(settings.half_extents, np.float64),
+                cell_eyes(np.zeros(3), np.asarray(settings.half_extents))[_CORNERS],
+                settings.faces,
+                settings.alpha,
+                settings.near,
+                settings.tolerance,
+                settings.segment,
+            )
+        clock.lap("residual")
+        return cell
+
+    def close(self) -> None:
+        """Free what the GPU holds."""
+        for thing in (self._abuffer, self._renderer, self._painter):
+            thing.close()
+
+    def _tolerance(self, face: int, settings: SlantedSettings) -> Tolerance:
+        return Tolerance.of(
+            face,
+            np.zeros(3),
+            settings.half_extents,
+            settings.alpha,
+            settings.near,
+            settings.tolerance,
+        )
+
+    def _visible(
+        self, centre: Floats, fragments: dict[int, Fragments], settings: SlantedSettings
+    ) -> dict[int, Fragments]:
+        """Fragments that some eye of the cell can see, and what continues them."""
+        points, slack = [], []
+        for face, here in fragments.items():
+            points.append(centre + texel_points(face, here.texel, here.disparity, self.resolution))
+            high = self._tolerance(face, settings).interval(here.disparity)[1]
+            slack.append(high - here.disparity)
+        eyes = cell_eyes(centre, np.asarray(settings.half_extents))
+        known = seen(np.concatenate(points), np.concatenate(slack), eyes, self.maps)
+        ends = np.cumsum([len(f.texel) for f in fragments.values()])
+        visible = {}
+        for (face, here), mask in zip(
+            fragments.items(), np.split(known, ends[:-1]), strict=True
+        ):
+            wider = spread(
+                here.texel,
+                here.disparity,
+                mask,
+                self._tolerance(face, settings),
+                self.resolution,
+                settings.spread,
+            )
+            visible[face] = here.take(wider)
+        return visible
+
+    def _centre_quads(
+        self, centre: Floats, face: int, fragments: Fragments, settings: SlantedSettings
+    ) -> EyeQuads:
+        seed, planes = seeds(self.scene, centre, face, fragments.triangle)
+        quads = face_quads(
+            fragments,
+            seed,
+            planes,
+            self._tolerance(face, settings),
+            walls(face, np.zeros(3), settings.near),
+            self.resolution,
+            settings.segment,
+        )
+        return EyeQuads(np.zeros(3), face, quads)
+
+
+class _Clock:
+    """Adds up the time between laps by name."""
+
+    def __init__(self, seconds: dict[str, float]) -> None:
+        self._seconds = seconds
+        self._last = time.perf_counter()
+
+    def lap(self, name: str) -> None:
+        now = time.perf_counter()
+        self._seconds[name] = now - self._last
+        self._last = now

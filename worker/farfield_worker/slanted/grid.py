@@ -1,0 +1,78 @@
+"""Fragments of a face by texel, and which of them a disparity plane may draw."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+#: texels a quad is grown by on each side, which closes hairlines between sheets (slanted/clip.py)
+GROWTH = 0.05
+
+
+class Grid(NamedTuple):
+    """The fragments of a face, sorted by texel.
+
+    Attributes:
+        starts: (resolution^2 + 1,) int32, first fragment of each texel.
+        disparity, low, high: (n,) float, true disparity and the interval allowed, 1/m.
+        owner: (n,) int32, the sheet that has captured each, -1 if none yet.
+        resolution: texels across the face.
+    """
+
+    starts: Ints
+    disparity: Floats
+    low: Floats
+    high: Floats
+    owner: Ints
+    resolution: int
+
+
+def texel_starts(texel: Ints, resolution: int) -> Ints:
+    """First fragment of each texel, (resolution^2 + 1,) int32, for `texel` (n,) in order."""
+    starts = np.searchsorted(texel, np.arange(resolution * resolution + 1))
+    return starts.astype(np.int32)
+
+
+@njit(cache=True)
+def value(resolution: int, x: int, y: int, a: float, b: float, c: float) -> float:
+    """Disparity of plane (a, b, c) at the centre of texel (x, y)."""
+    size = 2.0 / resolution
+    return a * ((x + 0.5) * size - 1.0) + b * ((y + 0.5) * size - 1.0) + c
+
+
+@njit(cache=True)
+def drawable(resolution: int, x: int, y: int, a: float, b: float, c: float) -> bool:
+    """Whether plane (a, b, c) is nowhere negative in the grown square of texel (x, y)."""
+    least = (abs(a) + abs(b)) * (1.0 + 2.0 * GROWTH) / resolution
+    return value(resolution, x, y, a, b, c) >= least
+
+
+@njit(cache=True)
+def match(grid: Any, x: int, y: int, a: float, b: float, c: float) -> int:
+    """Fragment, not yet captured, at texel (x, y) that plane (a, b, c) may draw; -1 if none."""
+    cell = y * grid.resolution + x
+    first, end = grid.starts[cell], grid.starts[cell + 1]
+    if first == end or not drawable(grid.resolution, x, y, a, b, c):
+        return -1
+    d = value(grid.resolution, x, y, a, b, c)
+    for f in range(first, end):
+        if grid.owner[f] < 0 and grid.low[f] <= d <= grid.high[f]:
+            return int(f)
+    return -1
+
+
+@njit(cache=True)
+def count_texels(grid: Any, plane: Any, x0: int, y0: int, x1: int, y1: int) -> int:
+    """Texels of a rectangle at which the plane may draw something."""
+    total = 0
+    for y in range(y0, y1):
+        for x in range(x0, x1):
+            if match(grid, x, y, plane[0], plane[1], plane[2]) >= 0:
+                total += 1
+    return total

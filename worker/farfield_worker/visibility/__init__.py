@@ -1,0 +1,1 @@
+"""What the eyes of a view cell can see."""

@@ -1,0 +1,66 @@
+"""Take what is seen a little further along its surface.
+
+Sampling from a few eyes misses what shows only through small gaps between near things, from places
+between the samples. What shows there mostly continues a surface that some eye does see. So fragments
+count as seen if a fragment within a few texels is, and lies on the same surface: next to it texel by
+texel, within three tolerances of its disparity. Measured in a street of the medieval town: 2 texels
+bring missing pixels from 3.1e-3 of the far field to 3.6e-4, for a quarter more quads.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from farfield_worker.slanted.grid import texel_starts
+from farfield_worker.slanted.tolerance import Tolerance
+
+Mask = NDArray[np.bool_]
+
+#: tolerances between neighbouring fragments of one surface
+STEP = 3.0
+
+
+def spread(
+    texel: NDArray[np.int32],
+    disparity: NDArray[np.floating],
+    seen: Mask,
+    tolerance: Tolerance,
+    resolution: int,
+    texels: int,
+) -> Mask:
+    """Fragments within `texels` steps of ones that are `seen` (n,): (n,) bool.
+
+    `texel` (n,), sorted, and `disparity` (n,), 1/m, are the fragments'; a step leads to any of the
+    nine texels around.
+    """
+    d = disparity.astype(np.float64)
+    low, high = tolerance.interval(d, STEP)
+    starts = texel_starts(texel, resolution)
+    result = seen.copy()
+    for _ in range(texels):
+        result = _step(texel, starts, d, low, high, result, resolution)
+    return result
+
+
+@njit(cache=True)
+def _step(
+    texel: Any, starts: Any, disparity: Any, low: Any, high: Any, seen: Any, resolution: int
+) -> Any:
+    """Fragments that are seen or next to one that is."""
+    grown = seen.copy()
+    for i in range(len(texel)):
+        if seen[i]:
+            continue
+        x, y = texel[i] % resolution, texel[i] // resolution
+        for ny in range(max(y - 1, 0), min(y + 2, resolution)):
+            # the fragments of up to three neighbouring texels lie in one run
+            first = starts[ny * resolution + max(x - 1, 0)]
+            end = starts[ny * resolution + min(x + 1, resolution - 1) + 1]
+            for j in range(first, end):
+                if seen[j] and low[i] <= disparity[j] <= high[i]:
+                    grown[i] = True
+    return grown
