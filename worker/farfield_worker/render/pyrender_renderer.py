@@ -172,6 +172,9 @@ class _Drawer(PyrenderRendererBase):  # type: ignore[misc]
                 GL.glBindRenderbuffer(GL.GL_RENDERBUFFER, buffer)
                 GL.glRenderbufferStorage(GL.GL_RENDERBUFFER, kind, *size)
 
+    def __del__(self) -> None:
+        """Do nothing: there may be no context any more; `close` frees everything."""
+
     def delete(self) -> None:
         for program in self._programs.values():
             program.delete()
