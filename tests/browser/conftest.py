@@ -69,8 +69,14 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def _server(pages: Path, room: Path) -> Iterator[WalkServer]:
-    server = WalkServer(pages, {"room": room})
+def smooth_room(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same with filtered, mipmapped textures."""
+    return write_room(tmp_path_factory.mktemp("smooth"), smooth=True).parent
+
+
+@pytest.fixture(scope="session")
+def _server(pages: Path, room: Path, smooth_room: Path) -> Iterator[WalkServer]:
+    server = WalkServer(pages, {"room": room, "smooth": smooth_room})
     yield server
     server.close()
 

@@ -1,4 +1,4 @@
-"""A near block by hand: quantised boxes, one primitive for every way a near polygon can be drawn."""
+"""A near block by hand: quantised boxes, one primitive for every way of drawing near polygons."""
 
 from __future__ import annotations
 
@@ -92,9 +92,9 @@ def quantise(positions: NDArray[np.float64]) -> NDArray[np.uint16]:
     return np.round((positions - TRANSLATION) / SPAN * 65535).astype(np.uint16)
 
 
-def texture_pixels() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Two images of 4 x 4 texels: colours, and a pattern of opacities."""
-    x, y = np.meshgrid(np.arange(4), np.arange(4))
+def texture_pixels(size: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Two images of `size` texels a side: colours, and a pattern of opacities."""
+    x, y = np.meshgrid(np.arange(size) & 3, np.arange(size) & 3)
     colors = np.stack([60 * x + 30, 60 * y + 30, 40 * (x ^ y) + 60, 0 * x + 255], axis=-1)
     holes = np.stack([0 * x + 240, 255 - 20 * x, 200 + 10 * y, 255 * ((x + y) & 1)], axis=-1)
     return colors.astype(np.uint8), holes.astype(np.uint8)
@@ -107,9 +107,17 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
     return buffer.getvalue()
 
 
-def near_block(write: Callable[[bytes, str], str]) -> tuple[str, list[int]]:
-    """Write the block and its textures; return its name and triangles per primitive."""
-    images = [{"uri": write(png(pixels), ".png")} for pixels in texture_pixels()]
+def near_block(write: Callable[[bytes, str], str], smooth: bool) -> tuple[str, list[int]]:
+    """Write the block and its textures; return its name and triangles per primitive.
+
+    Its textures have 4 texels a side and show them as squares, or, if it is to be `smooth`, 64
+    texels that are filtered and mipmapped.
+    """
+    pictures = texture_pixels(64 if smooth else 4)
+    images = [{"uri": write(png(pixels), ".png")} for pixels in pictures]
+    sampler = {"wrapS": 10497, "wrapT": 33648}
+    if not smooth:
+        sampler |= {"magFilter": 9728, "minFilter": 9986}
     data = bytearray()
     views: list[dict[str, Any]] = []
     accessors: list[dict[str, Any]] = []
@@ -170,7 +178,7 @@ def near_block(write: Callable[[bytes, str], str]) -> tuple[str, list[int]]:
         "meshes": [{"primitives": primitives}],
         "materials": materials,
         "images": images,
-        "samplers": [{"magFilter": 9728, "minFilter": 9986, "wrapS": 10497, "wrapT": 33648}],
+        "samplers": [sampler],
         "textures": [{"source": 0, "sampler": 0}, {"source": 1, "sampler": 0}],
         "accessors": accessors,
         "bufferViews": views,

@@ -13,11 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from PIL import Image
-
 from farfield_core.faces import FACES
 from farfield_shading import dither, shade, sky, to_linear, to_srgb
+from numpy.typing import NDArray
+from PIL import Image
 
 Floats = NDArray[np.float64]
 
@@ -46,7 +45,7 @@ class Picture:
 
     def put(self, where: NDArray[np.bool_], inverse: Floats, rgb: Floats) -> None:
         """Write `rgb` (..., 3) in 0..255 where nothing as near was written before."""
-        # What is hit at one depth is drawn once: the first. 1e-7 is what a depth buffer tells apart.
+        # What is hit at one depth is drawn once: the first. Depth buffers tell 1e-7 apart.
         wins = where & (inverse > self.inverse + 1e-7)
         self.color[wins, :3] = np.clip(np.round(rgb[wins]), 0, 255).astype(np.uint8)
         self.color[wins, 3] = 255
@@ -212,7 +211,7 @@ def draw_walk(
     pitch: float,
     size: tuple[int, int],
 ) -> NDArray[np.uint8]:
-    """RGBA picture (height, width, 4) of one cell from any eye, 60 degrees high; sky has alpha 0."""
+    """RGBA picture (height, width, 4) of one cell from any eye, 60 degrees high, sky alpha 0."""
     walk = json.loads((folder / "walk.json").read_text())
     cell = json.loads((folder / "cells" / f"{cell_name}.json").read_text())
     picture = Picture(camera_rays(yaw, pitch, math.radians(60), size), np.array(eye))

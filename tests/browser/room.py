@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from farfield_core.faces import FACES, directions
+from farfield_shading import default_light
 from numpy.typing import NDArray
 from PIL import Image
 
-from farfield_core.faces import FACES, directions
-from farfield_shading import default_light
 from tests.browser.near_block import near_block
 
 Floats = NDArray[np.float64]
@@ -146,7 +146,10 @@ def in_window(points: Floats) -> NDArray[np.bool_]:
 
 
 def clip(polygon: Floats, half_plane: Floats) -> Floats:
-    """The part of a convex polygon (n, 2) where half_plane @ (u, v, 1) >= 0 (Sutherland-Hodgman)."""
+    """The part of a convex polygon (n, 2) where half_plane @ (u, v, 1) >= 0.
+
+    This is Sutherland and Hodgman's clipping.
+    """
     kept: list[Floats] = []
     values = [float(half_plane @ np.array([*p, 1.0])) for p in polygon]
     for n, (p, value) in enumerate(zip(polygon, values, strict=True)):
@@ -242,10 +245,10 @@ def write_png(folder: Path, pixels: NDArray[np.uint8]) -> str:
     return write_blob(folder, data, ".png")
 
 
-def write_room(folder: Path) -> Path:
-    """Write the walk into `folder`; return the path of walk.json."""
+def write_room(folder: Path, *, smooth: bool = False) -> Path:
+    """Write the walk into `folder`, near textures squares or smooth; return walk.json's path."""
     near_folder = folder / "near"
-    blob, triangles = near_block(lambda data, suffix: write_blob(near_folder, data, suffix))
+    blob, triangles = near_block(lambda data, suffix: write_blob(near_folder, data, suffix), smooth)
     ranges = [value for n, count in enumerate(triangles) for value in (n, 0, count)]
     for index in CELLS:
         cell = CellWriter(index)

@@ -98,7 +98,7 @@ class WalkServer:
                 except (BrokenPipeError, ConnectionResetError):
                     self.close_connection = True  # the page has called off
 
-            def log_message(self, format: str, *args: Any) -> None:
-                del format, args
+            def log_message(self, *args: Any) -> None:
+                del args
 
         return Handler

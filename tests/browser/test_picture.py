@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from farfield_worker.shoot.command import shoot
+from farfield_worker.shoot.view import View
 from numpy.typing import NDArray
 
 from tests.browser.conftest import Visit
@@ -24,7 +26,7 @@ POSES = [
 
 
 def wrong(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float:
-    """Share of pixels with no match within 8/255 among the other picture's 3x3 pixels, both ways."""
+    """Share of pixels without a match within 8/255 in the other's 3x3 pixels, both ways."""
 
     def unmatched(p: NDArray[np.uint8], q: NDArray[np.uint8]) -> float:
         padded = np.pad(q.astype(int), ((1, 1), (1, 1), (0, 0)), mode="edge")
@@ -51,3 +53,22 @@ def test_equals_oracle(
     # Pixels whose ray grazes an edge may fall either way in single precision.
     assert different < 2e-4
     assert wrong(seen, wanted) <= 1e-3
+
+
+@pytest.mark.parametrize("walk", ["room", "smooth"])
+@pytest.mark.parametrize(("cell", "pose"), POSES)
+def test_equals_shoot(
+    visit: Visit,
+    server: WalkServer,
+    walk: str,
+    cell: str,
+    pose: tuple[float, ...],
+) -> None:
+    visit.open(f"{server.url}/walk/{walk}?capture")
+    visit.go_to(*pose)
+    assert visit.call("return farfield.stats.cell") == cell
+    view = View((pose[0], pose[1], pose[2]), pose[3], pose[4], size=256)
+    wanted = shoot(server.walks[walk], view).rgba
+    seen = visit.pixels()
+    assert ((wanted[..., 3] == 0) == (seen[..., 3] == 0)).all()
+    assert wrong(seen[..., :3], wanted[..., :3]) <= 1e-3

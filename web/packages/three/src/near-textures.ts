@@ -92,7 +92,8 @@ export class NearTextures {
         bitmap = await halve(bitmap);
       }
     }
-    const texture = allocate(description, bitmap.width, bitmap.height);
+    const texture = describe(description, bitmap.width, bitmap.height);
+    renderer.initTexture(texture);
     const mipmap = (): void => {
       texture.generateMipmaps = true;
     };
@@ -124,7 +125,7 @@ async function halve(bitmap: ImageBitmap): Promise<ImageBitmap> {
 }
 
 /** An empty sRGB texture with room for all mipmaps, which the last strip fills. */
-function allocate(description: NearTexture, width: number, height: number): DataTexture {
+function describe(description: NearTexture, width: number, height: number): DataTexture {
   const texture = new DataTexture(null, width, height);
   texture.colorSpace = SRGBColorSpace;
   texture.wrapS = WRAPPINGS[description.wrapS];
@@ -133,7 +134,7 @@ function allocate(description: NearTexture, width: number, height: number): Data
   texture.magFilter = nearest ? NearestFilter : LinearFilter;
   texture.minFilter = nearest ? NearestMipmapLinearFilter : LinearMipmapLinearFilter;
   texture.generateMipmaps = false;
-  // Naming the levels makes three allocate them all without computing them from nothing.
+  // Naming the levels makes three.js allocate them all without computing them from nothing.
   const levels = Math.floor(Math.log2(Math.max(width, height))) + 1;
   texture.mipmaps = Array.from({ length: levels }, (_, level) => ({
     data: new Uint8Array(0),

@@ -54,6 +54,7 @@ export class PagePool {
     // Only the memory is wanted now; pages fill it strip by strip.
     this.texture.source.dataReady = false;
     this.texture.needsUpdate = true;
+    options.renderer.initTexture(this.texture);
     this.store = new SharedStore({
       capacity: this.slots * this.pageBytes,
       load: (name, loading) => this.load(name, loading),
