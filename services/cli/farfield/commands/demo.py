@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 import tempfile
 import time
@@ -14,15 +16,17 @@ from farfield_api.settings import ApiSettings
 from farfield_core import scenes
 from farfield_core.bake import read_walk
 from farfield_core.corridor import Corridor, read_corridor
-from farfield_core.errors import BakeFailedError
+from farfield_core.errors import BakeFailedError, NotFoundError
 from farfield_core.settings import BakeSettings
 from farfield_core.store import Store
-from farfield_core.suggest import Suggestion, suggest_corridor
+from farfield_core.suggest import suggest_corridor
+from farfield_worker import demo
 
 from farfield.options import jobs_option, port_options, settings_options, store_option
 from farfield.progress import CellProgress, console, working
 from farfield.server import Server
 from farfield.target import prepared_scene
+from farfield.warming import warming_up
 
 
 @click.command("demo")
@@ -63,27 +67,22 @@ def command(
     service = create_service(api)
     try:
         with server.beside(create_app(api, service)):
-            bake = _begin(service, scene, wanted, detail, settings)
+            with warming_up():
+                identity = _scene(service.store, scene, detail)
+            bake = _begin(service, identity, wanted, settings)
             _watch(service, bake, f"{server.address}/walk/{bake}")
     except KeyboardInterrupt:
         click.echo("Stopped; run the same command again to go on.", err=True)
 
 
 def _begin(
-    service: FarfieldService,
-    scene: str | None,
-    corridor: Corridor | None,
-    detail: int,
-    settings: BakeSettings,
+    service: FarfieldService, identity: str, corridor: Corridor | None, settings: BakeSettings
 ) -> str:
-    """Prepare the scene and have its bake begun; returns the bake's id."""
-    chosen = None
-    if scene is None:
-        identity, chosen = _city(service.store, detail)
-    else:
-        identity = prepared_scene(service.store, scene).id
+    """Choose a corridor if need be and have its bake begun; returns the bake's id."""
     if corridor is None:
-        chosen = chosen or suggest_corridor(scenes.open_prepared(service.store, identity))
+        with working("Choosing a corridor"), tempfile.TemporaryDirectory() as folder:
+            scene = scenes.open_prepared(service.store, identity, Path(folder))
+            chosen = suggest_corridor(scene)
         corridor = chosen.corridor
         if "cell_size" not in settings.model_fields_set:
             edge = chosen.cell_size
@@ -99,16 +98,33 @@ def _begin(
     return bake
 
 
-def _city(store: Store, detail: int) -> tuple[str, Suggestion]:
-    """The demo city, prepared, and its walk."""
+def _scene(store: Store, scene: str | None, detail: int) -> str:
+    """A prepared scene's id: the one asked for, or the demo city, built once for each store."""
+    if scene is not None:
+        return prepared_scene(store, scene).id
+    key = f"demo/city-{detail}-{_city_version()}.json"
+    try:
+        city = str(json.loads(store.get(key))["scene"])
+        return scenes.scene_info(store, city).id
+    except NotFoundError:
+        pass
     from farfield_worker.demo.city import write_city  # noqa: PLC0415 - slow to import
 
     with tempfile.TemporaryDirectory(prefix="farfield-") as folder:
         model = Path(folder) / "Lake city.glb"
         with working("Building the demo city"):
             write_city(model, detail)
-        info = prepared_scene(store, str(model))
-    return info.id, suggest_corridor(scenes.open_prepared(store, info.id))
+        city = prepared_scene(store, str(model)).id
+    store.put(key, json.dumps({"scene": city}).encode())
+    return city
+
+
+def _city_version() -> str:
+    """Hash of the code that builds the demo city."""
+    digest = hashlib.sha256()
+    for file in sorted(Path(demo.__file__).parent.glob("*.py")):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def _watch(service: FarfieldService, bake: str, address: str) -> None:
