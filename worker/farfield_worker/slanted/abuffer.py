@@ -22,7 +22,7 @@ from farfield_worker.gl.scene_buffers import SceneBuffers
 from farfield_worker.render.target import VERTEX
 from farfield_worker.slanted.fragments import Fragments, sort_fragments
 from farfield_worker.slanted.near_border import walls
-from farfield_worker.visibility.blocks import ranges_in_view
+from farfield_worker.visibility.clusters import Clusters
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ layout(std430, binding = 0) buffer Count { uint count; };
 layout(std430, binding = 1) writeonly buffer Records { uvec4 records[]; };
 uniform vec3 walls[5];
 uniform int resolution;
-uniform int first_triangle;
+uniform int first;
 uniform uint capacity;
 
 void main() {
@@ -53,7 +53,7 @@ void main() {
   if (place < capacity) {
     uint texel = uint(gl_FragCoord.y) * uint(resolution) + uint(gl_FragCoord.x);
     records[place] = uvec4(texel, floatBitsToUint(disparity), packUnorm4x8(vec4(color, 1.0)),
-      uint(first_triangle + gl_PrimitiveID));
+      uint(first + gl_PrimitiveID));
   }
 }
 """
@@ -62,13 +62,17 @@ void main() {
 class ABuffer:
     """Draws A-buffers of one scene. Create it in the process that uses it, never before a fork."""
 
-    def __init__(self, scene: PreparedScene, capacity: int = _BYTES // _RECORD) -> None:
+    def __init__(
+        self,
+        scene: PreparedScene,
+        clusters: Clusters | None = None,
+        capacity: int = _BYTES // _RECORD,
+    ) -> None:
         self.scene = scene
         self.capacity = capacity
+        self._clusters = clusters or Clusters(scene)
         with gl.current() as context:
             self.buffers = SceneBuffers(context, scene, VERTEX, _FRAGMENT)
-            self._indices = context.buffer(np.ascontiguousarray(scene.triangles))
-            self._arrays = self.buffers.vertex_arrays(self._indices)
             self._count = context.buffer(reserve=16)
             self._records = context.buffer(reserve=capacity * _RECORD)
             self._framebuffer: moderngl.Framebuffer | None = None
@@ -89,26 +93,39 @@ class ABuffer:
         border[: len(planes)] = planes
         # a wall is nearest where the eye leans to it
         nearest = CLIP * (near - float(np.abs(offset).max()))
-        ranges = ranges_in_view(self.scene, eye, face, nearest)
-        records = []
-        with gl.current() as context:
-            self._begin(context, eye, face, nearest, resolution)
-            self.buffers.set(walls=[tuple(w) for w in border])
-            pending = [ranges]
-            while pending:
-                part = pending.pop()
-                count = self._draw(part)
-                if count <= self.capacity:
-                    data = self._records.read(count * _RECORD) if count else b""
-                    records.append(np.frombuffer(data, np.uint32).reshape(-1, 4))
-                else:
-                    pending.extend(_halves(part))
-        return sort_fragments(np.concatenate(records), resolution)
+        clusters = self._clusters.in_view(eye, face, nearest, resolution)
+        vertices, triangles, starts = self._clusters.triangles(
+            clusters, eye, face, nearest, resolution
+        )
+        runs = [
+            (batch, int(starts[batch]), int(starts[batch + 1] - starts[batch]))
+            for batch in np.flatnonzero(np.diff(starts)).tolist()
+        ]
+        records = [np.zeros((0, 4), np.uint32)]
+        if runs:
+            with gl.current() as context:
+                self._begin(context, eye, face, nearest, resolution)
+                self.buffers.set(walls=[tuple(w) for w in border])
+                indices = context.buffer(vertices)
+                arrays = self.buffers.vertex_arrays(indices)
+                while runs:
+                    batch, first, count = runs.pop()
+                    found = self._draw(arrays[batch], batch, first, count)
+                    if found <= self.capacity:
+                        data = self._records.read(found * _RECORD) if found else b""
+                        records.append(np.frombuffer(data, np.uint32).reshape(-1, 4))
+                    else:
+                        half = count // 2
+                        runs += [(batch, first, half), (batch, first + half, count - half)]
+                for thing in {id(a): a for a in arrays}.values():
+                    thing.release()
+                indices.release()
+        return sort_fragments(np.concatenate(records), triangles, resolution)
 
     def close(self) -> None:
         """Free what the GPU holds."""
         with gl.current():
-            for thing in (*self._arrays, self._indices, self._count, self._records):
+            for thing in (self._count, self._records):
                 thing.release()
             if self._framebuffer is not None:
                 self._framebuffer.release()
@@ -135,30 +152,11 @@ class ABuffer:
         self._count.bind_to_storage_buffer(0)
         self._records.bind_to_storage_buffer(1)
 
-    def _draw(self, ranges: NDArray[np.int64]) -> int:
-        """Draw `ranges` (k, 3), batch, first triangle, triangles; return how many fragments."""
+    def _draw(self, array: moderngl.VertexArray, batch: int, first: int, count: int) -> int:
+        """Draw `count` triangles of a batch from the `first`; return how many fragments."""
         self._count.write(bytes(16))
-        bound = -1
-        for batch, first, count in ranges.tolist():
-            if batch != bound:
-                self.buffers.bind(self.buffers.batches[batch])
-                bound = batch
-            array = self._arrays[batch]
-            if "first_triangle" in array.program:
-                array.program["first_triangle"].value = first
-            array.render(vertices=3 * count, first=3 * first)
+        self.buffers.bind(self.buffers.batches[batch])
+        array.program["first"].value = first
+        array.render(vertices=3 * count, first=3 * first)
         self.buffers.context.memory_barrier()
         return int(np.frombuffer(self._count.read(4), np.uint32)[0])
-
-
-def _halves(ranges: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Two parts of `ranges` (k, 3) of about half the triangles each."""
-    if len(ranges) > 1:
-        middle = len(ranges) // 2
-        return ranges[:middle], ranges[middle:]
-    batch, first, count = ranges[0].tolist()
-    half = count // 2
-    return (
-        np.array([[batch, first, half]]),
-        np.array([[batch, first + half, count - half]]),
-    )

@@ -23,6 +23,7 @@ from farfield_worker.slanted.quads import face_quads, texel_points
 from farfield_worker.slanted.residual import EyeQuads, residual_quads
 from farfield_worker.slanted.segment import SegmentSettings
 from farfield_worker.slanted.tolerance import DEFAULT_FACTOR, Tolerance
+from farfield_worker.visibility.clusters import Clusters
 from farfield_worker.visibility.depth_maps import DepthMapRenderer, MapCache
 from farfield_worker.visibility.from_region import cell_eyes, seen
 from farfield_worker.visibility.spread import spread
@@ -83,8 +84,9 @@ class SlantedBaker:
     def __init__(self, scene: PreparedScene, resolution: int, cache: int = 160) -> None:
         self.scene = scene
         self.resolution = resolution
-        self._abuffer = ABuffer(scene)
-        self._renderer = DepthMapRenderer(scene, resolution)
+        clusters = Clusters(scene)
+        self._abuffer = ABuffer(scene, clusters)
+        self._renderer = DepthMapRenderer(scene, resolution, clusters)
         self.maps = MapCache(self._renderer, cache)
         self._painter = QuadPainter(resolution)
 

@@ -29,10 +29,12 @@ class Fragments(NamedTuple):
         return Fragments(*(column[which] for column in self))
 
 
-def sort_fragments(records: NDArray[np.uint32], resolution: int) -> Fragments:
-    """Sort `records` (n, 4) uint32: texel, bits of the disparity, colour, triangle.
+def sort_fragments(
+    records: NDArray[np.uint32], triangles: NDArray[np.int32], resolution: int
+) -> Fragments:
+    """Sort `records` (n, 4) uint32: texel, bits of the disparity, colour, row of `triangles`.
 
-    The order is by texel, then from near to far, then by triangle, however the records came.
+    The order is by texel, then from near to far, then by row, however the records came.
     """
     order = np.empty(len(records), np.int32)
     _sort(records, np.zeros(resolution * resolution + 1, np.int32), order)
@@ -41,7 +43,7 @@ def sort_fragments(records: NDArray[np.uint32], resolution: int) -> Fragments:
         columns[0].view(np.int32),
         columns[1].view(np.float32),
         columns[2],
-        columns[3].view(np.int32),
+        triangles[columns[3]],
     )
 
 

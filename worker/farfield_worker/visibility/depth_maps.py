@@ -19,21 +19,24 @@ from numpy.typing import NDArray
 from farfield_worker.gl import context as gl
 from farfield_worker.gl.scene_buffers import SceneBuffers
 from farfield_worker.render.target import VERTEX
-from farfield_worker.visibility.blocks import ranges_in_view
+from farfield_worker.visibility.clusters import Clusters, InView
 
 Floats = NDArray[np.float64]
 
 #: nothing nearer to the eye than this, in metres, is seen
 NEAREST = 0.02
 
+#: triangles drawn before each test against what is drawn already
+ROUNDS = (40_000, 120_000)
+
 _FRAGMENT = """
-uniform int first_triangle;
+uniform int first;
 layout(location = 0) out uvec4 nearest;
 
 void main() {
   vec3 color = surface(gl_FragCoord.xy);
   nearest = uvec4(floatBitsToUint(gl_FragCoord.w), packUnorm4x8(vec4(color, 1.0)),
-    uint(first_triangle + gl_PrimitiveID), 0u);
+    uint(first + gl_PrimitiveID), 0u);
 }
 """
 
@@ -63,26 +66,27 @@ class MapSource(Protocol):
 
 
 class DepthMapRenderer:
-    """Draws depth maps. Create it in the process that uses it, never before a fork."""
+    """Draws depth maps. Create it in the process that uses it, never before a fork.
 
-    def __init__(self, scene: PreparedScene, resolution: int) -> None:
+    The nearest clusters of triangles are drawn first; the others only where those do not hide them.
+    """
+
+    def __init__(self, scene: PreparedScene, resolution: int, clusters: Clusters | None = None) -> None:
         self.scene = scene
         self.resolution = resolution
+        self._clusters = clusters or Clusters(scene)
         with gl.current() as context:
             self.buffers = SceneBuffers(context, scene, VERTEX, _FRAGMENT)
-            self._indices = context.buffer(np.ascontiguousarray(scene.triangles))
-            self._arrays = self.buffers.vertex_arrays(self._indices)
             self._texture = context.texture((resolution, resolution), 4, dtype="u4")
             self._depth = gl.float_depth(context, (resolution, resolution))
             self._framebuffer = context.framebuffer([self._texture], self._depth)
-            self._empty = np.tile(
-                np.array([0, 0, 0xFFFFFFFF, 0], np.uint32), resolution * resolution
-            ).tobytes()
+            self._empty = bytes(16 * resolution * resolution)
 
     def map(self, eye: Floats, face: int) -> DepthMap:
         """Depth map of `face` of `eye` (3,), scene coordinates."""
-        ranges = ranges_in_view(self.scene, eye, face, NEAREST)
         _, right, down, forward = FACES[face]
+        rest = self._clusters.in_view(eye, face, NEAREST, self.resolution)
+        ids = [np.zeros(0, np.int32)]
         with gl.current() as context:
             self._framebuffer.use()
             context.enable_only(moderngl.DEPTH_TEST)
@@ -96,27 +100,51 @@ class DepthMapRenderer:
                 forward=tuple(forward),
                 near=NEAREST,
             )
-            bound = -1
-            for batch, first, count in ranges.tolist():
-                if batch != bound:
-                    self.buffers.bind(self.buffers.batches[batch])
-                    bound = batch
-                self._arrays[batch].program["first_triangle"].value = first
-                self._arrays[batch].render(vertices=3 * count, first=3 * first)
-            data = np.frombuffer(self._texture.read(), np.uint32)
-        pixels = np.ascontiguousarray(data.reshape(-1, 4).T).reshape(4, *(self.resolution,) * 2)
-        return DepthMap(pixels[0].view(np.float32), pixels[1], pixels[2].view(np.int32))
+            for budget in ROUNDS:
+                some = int(np.searchsorted(np.cumsum(rest.triangles), budget))
+                ids.append(self._draw(context, rest.take(slice(some)), eye, face, sum(map(len, ids))))
+                rest = rest.take(slice(some, None))
+                if len(rest.cluster) == 0:
+                    break
+                rest = self._clusters.not_hidden(rest, self._read()[0].view(np.float32))
+            ids.append(self._draw(context, rest, eye, face, sum(map(len, ids))))
+            disparity, color, drawn = self._read()[:3]
+        triangle = np.concatenate([*ids, [-1]]).astype(np.int32)
+        shown = disparity.view(np.float32)
+        return DepthMap(shown, color, triangle[np.where(shown > 0, drawn.view(np.int32), -1)])
+
+    def _draw(
+        self, context: moderngl.Context, clusters: InView, eye: Floats, face: int, first: int
+    ) -> NDArray[np.int32]:
+        """Draw `clusters`, numbering their triangles from `first`; return the triangles."""
+        vertices, triangles, starts = self._clusters.triangles(
+            clusters, eye, face, NEAREST, self.resolution
+        )
+        if len(triangles) == 0:
+            return triangles
+        indices = context.buffer(vertices)
+        arrays = self.buffers.vertex_arrays(indices)
+        for batch in np.flatnonzero(np.diff(starts)).tolist():
+            self.buffers.bind(self.buffers.batches[batch])
+            arrays[batch].program["first"].value = first + int(starts[batch])
+            arrays[batch].render(
+                vertices=3 * int(starts[batch + 1] - starts[batch]), first=3 * int(starts[batch])
+            )
+        for thing in {id(a): a for a in arrays}.values():
+            thing.release()
+        indices.release()
+        return triangles
+
+    def _read(self) -> NDArray[np.uint32]:
+        """The framebuffer as four pictures, (4, h, w) uint32."""
+        data = np.frombuffer(self._texture.read(), np.uint32)
+        planes = np.ascontiguousarray(data.reshape(-1, 4).T)
+        return planes.reshape(4, self.resolution, self.resolution)
 
     def close(self) -> None:
         """Free what the GPU holds."""
         with gl.current():
-            for thing in (
-                *self._arrays,
-                self._indices,
-                self._framebuffer,
-                self._texture,
-                self._depth,
-            ):
+            for thing in (self._framebuffer, self._texture, self._depth):
                 thing.release()
             self.buffers.release()
 
