@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from farfield_worker.shoot.scene import SceneShooter
 from farfield_worker.shoot.view import NearField, Picture, View
 from farfield_worker.shoot.walk import WalkShooter, find_walk
-from farfield_worker.verify.metrics import Figures, Rgb, Shot, combine, compare, flip_map
+from farfield_worker.verify.metrics import Figures, Rgb, Shot, combine, compare, mean_flip
 from farfield_worker.verify.views import Pose, look, poses
 
 FOV = 60.0
@@ -161,7 +161,7 @@ class Verifier:
             second = shot(self._walks.shoot(view, neighbour.cell))
             far = first.far | second.far
             if far.any():
-                yield float(flip_map(first.rgb, second.rgb)[far].mean()), int(far.sum())
+                yield mean_flip(first.rgb, second.rgb, far), int(far.sum())
 
     def cells(self) -> list[CellFile]:
         """The cells that are baked."""
