@@ -88,6 +88,17 @@ def test_ply_points_alone_are_refused(tmp_path):
         prepared(path, tmp_path)
 
 
+def test_binary_ply_of_mixed_polygons_is_refused(tmp_path):
+    header = ASCII_PLY.split("end_header", maxsplit=1)[0].replace("ascii", "binary_little_endian")
+    vertices = np.zeros(4, "f4,f4,f4,u1,u1,u1,f4,f4").tobytes()
+    faces = b"\3" + np.arange(3, dtype="i4").tobytes() + b"\4" + np.arange(4, dtype="i4").tobytes()
+    path = tmp_path / "m.ply"
+    head = header.replace("face 1", "face 2") + "end_header\n"
+    path.write_bytes(head.encode() + vertices + faces)
+    with pytest.raises(SceneRefusedError, match="different numbers of corners"):
+        prepared(path, tmp_path)
+
+
 @pytest.mark.parametrize("form", ["stl", "stl_ascii"])
 def test_stl(tmp_path, form):
     box = trimesh.creation.box((1, 2, 3))

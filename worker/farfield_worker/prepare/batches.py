@@ -126,6 +126,8 @@ def _look(
 ) -> Look:
     _, has_uvs, low, high = key
     base = material.base if has_uvs else None
+    if material.base is not None and not has_uvs:
+        _note(model, "A part without texture coordinates lost its texture.")
     if base is not None:
         least, greatest = files.opacity(base)
         low, high = low * least, high * greatest
@@ -178,8 +180,11 @@ def _emission(
     index = files.add(use, keep_alpha=False) if has_uvs and fits else None
     if index is None:
         # the factor alone would make the whole surface shine
-        note = "An emissive texture could not be used; that surface does not shine."
-        if note not in model.notes:
-            model.notes.append(note)
+        _note(model, "An emissive texture could not be used; that surface does not shine.")
         return (0.0, 0.0, 0.0), None
     return material.emissive, index
+
+
+def _note(model: Model, text: str) -> None:
+    if text not in model.notes:
+        model.notes.append(text)

@@ -65,7 +65,6 @@ class Primitives:
             return None
         name = f"TEXCOORD_{use.texcoord}"
         if not source.has(name):
-            self.document.note("A textured primitive without texture coordinates lost its texture.")
             return None
         uvs = source.floats(name, rows, 2)
         if use.transform is not None:
