@@ -139,7 +139,14 @@ def _round_tree(dice: Dice) -> Iterator[Leaf]:
         bump = 0.86 + 0.14 * dice.between(0, 1)
         x, y = WIDTH / 2 + 58 * a * bump, 98 + 92 * b * bump
         dx, dy = dice.between(-7, 7), dice.between(-6, 6) + 0.5
-        yield x, y, dx, dy, dice.between(2.5, 4.2), _green(dice, min(1.0, (1 - t) + 0.3 * (b > 0.4)))
+        yield (
+            x,
+            y,
+            dx,
+            dy,
+            dice.between(2.5, 4.2),
+            _green(dice, min(1.0, (1 - t) + 0.3 * (b > 0.4))),
+        )
 
 
 def _frond(dice: Dice) -> Iterator[Leaf]:
