@@ -1,9 +1,9 @@
-"""The demo scene: a city in a lake, drawn by our own code, from 50 thousand to 10 million triangles.
+"""The demo scene: a city in a lake, of 50 thousand to 10 million triangles.
 
     facts = write_city(Path("city.glb"), triangles=850_000)
 
-The plan, the silhouettes and the share of every part of the city are the same whatever the number of
-triangles; only how finely everything is worked out differs.
+The plan, the silhouettes and the share of every part of the city are the same whatever the number
+of triangles; only how finely everything is worked out differs.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from farfield_worker.demo.lighting import HeightMap
 from farfield_worker.demo.looks import Material
 from farfield_worker.demo.parts import City, build, select
 from farfield_worker.demo.surfaces import Kind, Surfaces
-from farfield_worker.demo.tessellate import divisions, tessellate, unevenness
+from farfield_worker.demo.tessellate import tessellate, unevenness
 from farfield_worker.demo.textures import textures
 
 TRIANGLES = 850_000
@@ -65,7 +65,7 @@ class CityHash:
         self._hash = hashlib.sha256()
         for material, image in images.items():
             self._hash.update(bytes([material]))
-            self._hash.update(np.ascontiguousarray(image))
+            self._hash.update(image.tobytes())
 
     def add(self, primitive: Primitive) -> None:
         """Take in one primitive."""
@@ -76,7 +76,7 @@ class CityHash:
             primitive.colors,
             primitive.triangles.astype("<u4"),
         ):
-            self._hash.update(np.ascontiguousarray(array))
+            self._hash.update(array.tobytes())
 
     def digest(self) -> str:
         """First 32 hex digits."""
@@ -214,7 +214,7 @@ def _water_tint(light: HeightMap, p: NDArray[np.float64]) -> NDArray[np.float64]
     near = light.wide.ravel()[light.metres(p[:, 0], p[:, 2])].astype(np.float64)
     shallow = np.clip(near / 0.9, 0, 1)[:, None]
     streaks = 0.84 + 0.16 * unevenness(p * 0.033)[:, :1]
-    return (1 - shallow) * streaks + shallow * np.array((0.62, 0.80, 0.66))
+    return np.asarray((1 - shallow) * streaks + shallow * np.array((0.62, 0.80, 0.66)))
 
 
 def _png(image: NDArray[np.uint8], material: Material) -> bytes:

@@ -14,8 +14,8 @@ _FLOAT, _BYTE, _UINT = 5126, 5121, 5125
 
 
 class Primitive(NamedTuple):
-    """Triangles of one material: positions, normals (n, 3), uvs (n, 2) float32; colors (n, 4) uint8,
-    linear; triangles (m, 3) uint32.
+    """Triangles of one material: positions, normals (n, 3), uvs (n, 2) float32; colors (n, 4)
+    uint8, linear; triangles (m, 3) uint32.
     """
 
     material: int

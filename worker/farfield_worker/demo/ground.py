@@ -6,6 +6,8 @@ follow every court. Each tile of two by two blocks changes over at a level of it
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,7 +45,7 @@ def rectangles(classes: Classes, tile: int) -> Rows:
     """
     size = len(classes)
     lines = [0, *range(_START, size, tile), size]
-    spans = list(zip(lines[:-1], lines[1:], strict=True))
+    spans = list(pairwise(lines))
     rows = []
     for z0, z1 in spans:
         for x0, x1 in spans:
@@ -155,7 +157,7 @@ def quays(layout: Layout) -> Surfaces:
             for k in np.flatnonzero(step.any(axis=0)):
                 key = np.where(step[:, k], high[:, k] * 64 + low[:, k], -1.0)
                 bounds = [*_cuts(np.diff(key) != 0), len(key)]
-                for start, stop in zip(bounds[:-1], bounds[1:], strict=True):
+                for start, stop in pairwise(bounds):
                     if key[start] < 0:
                         continue
                     water = bool(under[start, k])
@@ -213,7 +215,7 @@ def water(layout: Layout) -> Surfaces:
     """One level surface in patches; patches without any water are left out."""
     count = 24
     cell = 2 * EXTENT / count
-    i, j = (k.ravel() for k in np.meshgrid(np.arange(count), np.arange(count)))
+    i, j = (k.ravel().astype(np.float64) for k in np.meshgrid(np.arange(count), np.arange(count)))
     x0, z0 = i * cell - EXTENT, j * cell - EXTENT
     wet = layout.classes <= Ground.CANAL
     corners = zip((x0 + HALF).astype(int).tolist(), (z0 + HALF).astype(int).tolist(), strict=True)
@@ -239,7 +241,7 @@ def land() -> Surfaces:
     """The shore and the hills."""
     cell = 45.0
     count = int(2 * EXTENT / cell)
-    i, j = (k.ravel() for k in np.meshgrid(np.arange(count), np.arange(count)))
+    i, j = (k.ravel().astype(np.float64) for k in np.meshgrid(np.arange(count), np.arange(count)))
     x0, z0 = i * cell - EXTENT, j * cell - EXTENT
     keep = _samples(x0, z0, cell).max(axis=1) > -0.8
     x0, z0 = x0[keep], z0[keep]

@@ -1,239 +1,33 @@
-"""Houses: flat-roofed adobe wings around a court, and thatched huts near the rim.
-
-Levels: below about 0.45 a wing is one block as high as its parapet; doors, then windows, beams,
-merlons, pots, frames appear as the level rises, each house a little earlier or later than the next.
-"""
+"""Houses: wings around a court, or a thatched hut in a garden."""
 
 from __future__ import annotations
 
 from farfield_worker.demo.hashing import Dice
 from farfield_worker.demo.layout import HEIGHTS, Ground, Layout, Parcel, Rect
 from farfield_worker.demo.looks import (
-    BANDS,
+    ADOBE,
     CLAY,
     CLOTHS,
     DARK,
-    ADOBE,
     LIME,
     OLD_WOOD,
     THATCH,
     WALLS,
-    WOOD,
     Look,
     Material,
     Rgb,
-    rgb,
 )
 from farfield_worker.demo.sketch import (
-    CLOSED,
-    EAST,
     NORTH,
     SIDES,
     SOUTH,
     STANDING,
-    TOP,
-    WEST,
-    Levels,
     Place,
     Sketch,
     turned_faces,
 )
 from farfield_worker.demo.surfaces import ENDLESS
-
-STREET = HEIGHTS[Ground.STREET]
-ROOF = Look(Material.STUCCO, rgb("e8d8ba"), grain=0.16)
-
-
-class Wing:
-    """One flat-roofed body and what is on it; x, z are scene coordinates."""
-
-    def __init__(
-        self,
-        sketch: Sketch,
-        area: Rect,
-        foot: float,
-        top: float,
-        wall: Look,
-        dice: Dice,
-        seen: int = STANDING,
-    ) -> None:
-        """`seen`: faces that no other wing hides; the coarse body has only these."""
-        self.sketch, self.area, self.foot, self.top = sketch, area, foot, top
-        self.wall, self.dice, self.seen = wall, dice, seen
-        self.parapet = dice.between(0.35, 0.6)
-        self.full = dice.between(0.1, 0.2)
-        self._body()
-
-    def _body(self) -> None:
-        s, (x0, z0, x1, z1) = self.sketch, self.area
-        low = (x0, self.foot - 0.4, z0)
-        rim = self.top + self.parapet
-        coarse, fine = (0.0, self.full), (self.full, ENDLESS)
-        roof = ROOF.shaded(self.dice.between(0.86, 1.05))
-        s.box(low, (x1, rim, z1), self.wall, top=roof, levels=coarse, solid=True,
-              faces=self.seen)
-        # the walls run up to the rim in one piece; inside them the roof lies lower
-        s.box(low, (x1, rim, z1), self.wall, faces=SIDES, levels=fine)
-        t = 0.28
-        s.box((x0 + t, self.top - 1, z0 + t), (x1 - t, self.top, z1 - t), roof, faces=TOP,
-              levels=fine)
-        for strip, inside in (
-            ((x0, z0, x1, z0 + t), SOUTH),
-            ((x0, z1 - t, x1, z1), NORTH),
-            ((x0, z0 + t, x0 + t, z1 - t), EAST),
-            ((x1 - t, z0 + t, x1, z1 - t), WEST),
-        ):
-            s.box((strip[0], self.top, strip[1]), (strip[2], rim, strip[3]), self.wall,
-                  faces=inside | TOP, levels=fine)
-
-    def side(self, front: int) -> tuple[Place, float, float]:
-        """Frame with its origin at the middle of a wall's foot, its length and its height."""
-        x0, z0, x1, z1 = self.area
-        mx, mz = (x0 + x1) / 2, (z0 + z1) / 2
-        at = ((mx, z1), (x1, mz), (mx, z0), (x0, mz))[front]
-        length = self.area.width if front % 2 == 0 else self.area.depth
-        return Place(at[0], self.foot, at[1], front), length, self.top - self.foot
-
-    def opening(
-        self, front: int, x: float, y: float, width: float, height: float, level: float, door: bool
-    ) -> None:
-        """A door or window: a dark panel between jambs under a lintel of wood."""
-        s = self.sketch
-        at, _, _ = self.side(front)
-        h = width / 2
-        panel = DARK.shaded(self.dice.between(0.8, 1.5))
-        s.box((x - h, y, -0.2), (x + h, y + height, 0.05), panel, at=at, faces=SOUTH,
-              levels=(level, ENDLESS))
-        frame = level * 1.2 + 0.1
-        after: Levels = (frame, ENDLESS)
-        tone = OLD_WOOD.shaded(self.dice.between(0.75, 1.1))
-        s.box((x - h - 0.25, y + height, -0.1), (x + h + 0.25, y + height + 0.24, 0.13), tone,
-              at=at, faces=CLOSED & ~NORTH, levels=after)
-        if door or self.dice.chance(0.6):
-            jamb = self.wall.shaded(0.86)
-            more: Levels = (frame * 1.8, ENDLESS)
-            for side in (-1, 1):
-                a, b = sorted((x + side * h, x + side * (h + 0.18)))
-                s.box((a, y, -0.1), (b, y + height, 0.1), jamb, at=at, faces=STANDING & ~NORTH,
-                      levels=more)
-        if door:
-            s.box((x - h - 0.3, -0.3, -0.2), (x + h + 0.3, self.dice.between(0.1, 0.2), 0.55), STONE_STEP, at=at,
-                  faces=STANDING & ~NORTH, levels=(frame, ENDLESS))
-            if self.dice.chance(0.35):
-                cloth = Look(Material.CLOTH, self.dice.pick(CLOTHS), grain=0.8)
-                s.quad(((x - h, y + 0.3, 0.08), (x + h * 0.3, y + 0.35, 0.09),
-                        (x + h * 0.4, y + height, 0.07), (x - h, y + height, 0.07)),
-                       cloth, at=at, uv=(0, 0.5, 1, 0.2), levels=(frame * 1.1, ENDLESS))
-        elif self.dice.chance(0.55):
-            s.box((x - h - 0.12, y - 0.14, -0.1), (x + h + 0.12, y, 0.16), tone, at=at,
-                  faces=CLOSED & ~NORTH, levels=(frame * 1.5, ENDLESS))
-
-    def facade(self, front: int, door: bool) -> None:
-        """Openings, beams, a painted band and merlons on one side."""
-        s, dice = self.sketch, self.dice
-        at, length, height = self.side(front)
-        if length < 2.2:
-            return
-        if dice.chance(0.45):
-            band = LIME.tinted(*dice.pick(BANDS))._replace(rough=self.wall.rough, grain=0.14)
-            tall = dice.between(0.5, 1.1)
-            e = length / 2 - 0.02
-            s.box((-e, -0.3, -0.1), (e, tall, 0.06), band, at=at,
-                  faces=STANDING & ~NORTH, levels=(dice.between(0.2, 0.4), ENDLESS))
-        slots = max(1, int((length - 0.8) / dice.between(2.3, 3.3)))
-        pitch = length / slots
-        entrance = slots // 2 if door else -1
-        storeys = max(1, int((height - 0.4) / 2.7))
-        for storey in range(storeys):
-            base = storey * height / storeys
-            for k in range(slots):
-                x = (k + 0.5) * pitch - length / 2 + dice.between(-0.25, 0.25)
-                if storey == 0 and (k == entrance or (entrance < 0 and dice.chance(0.12))):
-                    wide = dice.between(1.0, 1.5)
-                    tall = min(dice.between(1.95, 2.3), height - 0.7)
-                    self.opening(front, x, 0.02, wide, tall, dice.between(0.06, 0.16), True)
-                    if door and k == entrance and dice.chance(0.4):
-                        self.awning(at, x, tall + 0.45, wide)
-                elif dice.chance(0.62):
-                    tall = dice.between(0.6, 1.05)
-                    y = base + min(dice.between(1.2, 1.5), height / storeys - tall - 0.5)
-                    self.opening(front, x, y, dice.between(0.55, 0.95), tall,
-                                 dice.between(0.1, 0.26), False)
-        if dice.chance(0.65):
-            self.beams(at, length, height)
-        self.crown(at, length, height)
-
-    def awning(self, at: Place, x: float, y: float, wide: float) -> None:
-        """A cloth on two poles over the door."""
-        s, dice = self.sketch, self.dice
-        w, d = wide / 2 + dice.between(0.5, 1.0), dice.between(1.4, 2.2)
-        cloth = Look(Material.CLOTH, dice.pick(CLOTHS), grain=0.9)
-        low = y - 0.35
-        level = dice.between(0.16, 0.36)
-        s.quad(((-w + x, low, d), (w + x, low, d), (w + x, y, 0.06), (-w + x, y, 0.06)), cloth,
-               at=at, uv=(0, w, 1, 0), sag=(0.0, -0.18, 0.0), levels=(level, ENDLESS))
-        for side in (-1, 1):
-            px = x + side * (w - 0.06)
-            s.box((px - 0.05, -0.2, d - 0.1), (px + 0.05, low + 0.02, d), OLD_WOOD, at=at,
-                  faces=SIDES, levels=(level, ENDLESS))
-
-    def beams(self, at: Place, length: float, height: float) -> None:
-        """Round beams that carry the roof and stick out under it."""
-        dice = self.dice
-        count = max(2, int(length / dice.between(1.0, 1.4)))
-        tone = WOOD.shaded(dice.between(0.65, 0.95))._replace(grain=0.0)
-        reach = dice.between(0.28, 0.5)
-        y = height - 0.5
-        for k in range(count):
-            x = (k + 0.5) / count * length - length / 2
-            # every other one earlier, so that rows grow denser
-            level = (0.24 if k % 2 else 0.38) + dice.between(-0.06, 0.1)
-            self.sketch.box((x - 0.09, y, -0.1), (x + 0.09, y + 0.18, reach), tone, at=at,
-                            faces=CLOSED & ~NORTH, levels=(level, ENDLESS))
-
-    def crown(self, at: Place, length: float, height: float) -> None:
-        """What stands on the parapet of one side: merlons, a cornice, or nothing."""
-        dice, s = self.dice, self.sketch
-        style = dice.whole(0, 4)
-        y = height + self.parapet
-        if style <= 1:
-            count = max(2, int(length / 1.45))
-            level = dice.between(0.2, 0.4)
-            e = min(0.32, length / count * 0.3)
-            for k in range(count):
-                x = (k + 0.5) / count * length - length / 2
-                tall = 0.42 if style else 0.34
-                s.box((x - e, y - 0.02, -0.27), (x + e, y + tall, -0.01), self.wall, at=at,
-                      taper=(0.0, 0.0) if style else (e * 0.55, 0.02), levels=(level, ENDLESS))
-        elif style == 2:
-            s.box((-length / 2 - 0.07, y - 0.2, -0.3), (length / 2 + 0.07, y + 0.06, 0.08),
-                  self.wall.shaded(0.92), at=at, faces=CLOSED, levels=(self.full, ENDLESS))
-
-    def roofscape(self) -> None:
-        """Hatch, pots, mats, a ladder's end on the roof."""
-        s, dice = self.sketch, self.dice
-        x0, z0, x1, z1 = self.area.inset(0.7)
-        if x1 - x0 < 1.5 or z1 - z0 < 1.5:
-            return
-        if dice.chance(0.3):
-            x, z = dice.between(x0, x1 - 1.2), dice.between(z0, z1 - 1.2)
-            s.box((x, self.top - 0.05, z), (x + 1.2, self.top + dice.between(0.5, 0.9), z + 1.2),
-                  self.wall.shaded(0.93), levels=(dice.between(0.2, 0.4), ENDLESS))
-        for _ in range(dice.whole(0, 4)):
-            x, z, r = dice.between(x0, x1), dice.between(z0, z1), dice.between(0.18, 0.38)
-            s.lathe((x, self.top - 0.02, z), r, r * dice.between(1.7, 2.4), 2,
-                    CLAY.shaded(dice.between(0.8, 1.3)), sides=7, rings=3,
-                    levels=(dice.between(0.35, 0.9), ENDLESS))
-        if dice.chance(0.35):
-            x, z = dice.between(x0, x1 - 1.0), dice.between(z0, z1 - 1.0)
-            y = self.top + 0.06
-            a, b = dice.between(0.8, 1.8), dice.between(0.8, 1.8)
-            mat = Look(Material.CLOTH, dice.pick(CLOTHS), grain=0.6)
-            s.quad(((x, y, z + b), (x + a, y, z + b), (x + a, y + 0.05, z), (x, y + 0.05, z)), mat,
-                   uv=(0, 1, 1, 0), levels=(dice.between(0.35, 0.8), ENDLESS))
-
-
-STONE_STEP = Look(Material.STONE, rgb("c8bba0"), grain=0.2)
+from farfield_worker.demo.wings import STREET, Wing
 
 
 def house(sketch: Sketch, layout: Layout, parcel: Parcel, dice: Dice) -> None:
@@ -251,9 +45,7 @@ def house(sketch: Sketch, layout: Layout, parcel: Parcel, dice: Dice) -> None:
     front = parcel.front
     at = Place(0.0, 0.0, 0.0, front)
     # local frame: front at +z
-    width, depth = (
-        (area.width, area.depth) if front % 2 == 0 else (area.depth, area.width)
-    )
+    width, depth = (area.width, area.depth) if front % 2 == 0 else (area.depth, area.width)
     mx, mz = (area.x0 + area.x1) / 2, (area.z0 + area.z1) / 2
     at = Place(mx, 0.0, mz, front)
     w, d = width / 2, depth / 2
@@ -278,7 +70,7 @@ def house(sketch: Sketch, layout: Layout, parcel: Parcel, dice: Dice) -> None:
     for k, (x0, z0, x1, z1) in enumerate(rects):
         if thick[k] == 0.0:
             if k != 0 or thick[2] > 0:
-                inner = (-w + thick[3], -d, w - thick[1], d)
+                inner = (-w + (thick[3] or 0.2), -d, w - (thick[1] or 0.2), d)
                 _yard_wall(sketch, at, rects[k] if k % 2 else inner, k, wall, dice)
             continue
         (ax, _, az), (bx, _, bz) = at.point(x0, 0, z0), at.point(x1, 0, z1)
@@ -311,19 +103,23 @@ def _yard_wall(
     else:
         z0, z1 = z0 + 0.08, z1 - 0.08
     if k == 0:
-        for a, b in ((x0, -1.1), (1.1, x1)):
+        m, gate = (x0 + x1) / 2, min(1.1, (x1 - x0) / 2 - 0.4)
+        for a, b in ((x0, m - gate), (m + gate, x1)):
             s.box((a, STREET - 0.4, z1 - t), (b, tall, z1), wall, at=at)
-        for x in (-1.3, 1.3):
-            s.box((x - 0.3, STREET - 0.4, z1 - 0.5), (x + 0.3, tall + 0.5, z1 + 0.12),
-                  wall.shaded(0.9), at=at, levels=(0.5, ENDLESS))
+        for x in (m - gate - 0.2, m + gate + 0.2):
+            s.box(
+                (x - 0.3, STREET - 0.4, z1 - 0.5),
+                (x + 0.3, tall + 0.5, z1 + 0.12),
+                wall.shaded(0.9),
+                at=at,
+                levels=(0.5, ENDLESS),
+            )
         return
     line = {1: (x1 - t, z0, x1, z1), 3: (x0, z0, x0 + t, z1), 2: (x0, z0, x1, z0 + t)}[k]
     s.box((line[0], STREET - 0.4, line[1]), (line[2], tall, line[3]), wall, at=at)
 
 
-def _court(
-    s: Sketch, at: Place, rect: tuple[float, float, float, float], dice: Dice
-) -> None:
+def _court(s: Sketch, at: Place, rect: tuple[float, float, float, float], dice: Dice) -> None:
     """Things in a court: oven, trough, pots, a roof of cloth."""
     x0, z0, x1, z1 = rect[0] + 0.8, rect[1] + 0.8, rect[2] - 0.8, rect[3] - 0.8
     y = HEIGHTS[Ground.COURT]
@@ -331,27 +127,60 @@ def _court(
         return
     if dice.chance(0.5):
         x, z = dice.between(x0, x1), dice.between(z0, z1)
-        s.lathe((x, y - 0.05, z), dice.between(0.8, 1.2), dice.between(0.9, 1.3), 3,
-                LIME.shaded(0.85)._replace(grain=0.0), at=at, sides=8, rings=3,
-                levels=(dice.between(0.2, 0.4), ENDLESS))
+        s.lathe(
+            (x, y - 0.05, z),
+            dice.between(0.8, 1.2),
+            dice.between(0.9, 1.3),
+            3,
+            LIME.shaded(0.85)._replace(grain=0.0),
+            at=at,
+            sides=8,
+            rings=3,
+            levels=(dice.between(0.2, 0.4), ENDLESS),
+        )
     for _ in range(dice.whole(1, 5)):
         x, z, r = dice.between(x0, x1), dice.between(z0, z1), dice.between(0.2, 0.45)
-        s.lathe((x, y - 0.03, z), r, r * dice.between(1.6, 2.3), 2,
-                CLAY.shaded(dice.between(0.75, 1.3)), at=at, sides=7, rings=3,
-                levels=(dice.between(0.35, 0.9), ENDLESS))
+        s.lathe(
+            (x, y - 0.03, z),
+            r,
+            r * dice.between(1.6, 2.3),
+            2,
+            CLAY.shaded(dice.between(0.75, 1.3)),
+            at=at,
+            sides=7,
+            rings=3,
+            levels=(dice.between(0.35, 0.9), ENDLESS),
+            lid=(0.61, 0.985, DARK),
+        )
     if dice.chance(0.35):
         w, d, h = dice.between(1.2, 1.8), dice.between(1.1, 1.6), y + dice.between(2.1, 2.5)
         x, z = (x0 + x1) / 2, (z0 + z1) / 2
         if x1 - x0 > 2 * w and z1 - z0 > 2 * d:
             cloth = Look(Material.CLOTH, dice.pick(CLOTHS), grain=0.8)
             level = dice.between(0.2, 0.4)
-            s.quad(((x - w, h, z + d), (x + w, h, z + d), (x + w, h + 0.3, z - d),
-                    (x - w, h + 0.3, z - d)), cloth, at=at, uv=(0, 1.5, 1, 0),
-                   sag=(0, -0.2, 0), levels=(level, ENDLESS))
+            s.quad(
+                (
+                    (x - w, h, z + d),
+                    (x + w, h, z + d),
+                    (x + w, h + 0.3, z - d),
+                    (x - w, h + 0.3, z - d),
+                ),
+                cloth,
+                at=at,
+                uv=(0, 1.5, 1, 0),
+                sag=(0, -0.2, 0),
+                levels=(level, ENDLESS),
+            )
             for px in (x - w + 0.05, x + w - 0.05):
                 for pz, top in ((z + d - 0.05, h), (z - d + 0.05, h + 0.3)):
-                    s.box((px - 0.05, y - 0.1, pz - 0.05), (px + 0.05, top + 0.03, pz + 0.05),
-                          OLD_WOOD, at=at, faces=SIDES, levels=(level, ENDLESS))
+                    s.box(
+                        (px - 0.05, y - 0.1, pz - 0.05),
+                        (px + 0.05, top + 0.03, pz + 0.05),
+                        OLD_WOOD,
+                        at=at,
+                        faces=SIDES,
+                        levels=(level, ENDLESS),
+                    )
 
 
 def hut(sketch: Sketch, layout: Layout, parcel: Parcel, dice: Dice) -> None:
@@ -375,33 +204,47 @@ def thatched(sketch: Sketch, at: Place, w: float, d: float, dice: Dice) -> None:
     sketch.solids.append((*span, at.y + tall + 0.4 * ridge))
     wall = ADOBE.tinted(*dice.pick(WALLS[3:])).shaded(dice.between(0.8, 1.0))
     sketch.box((-w, -0.4, -d), (w, tall + 0.1, d), wall, at=at, faces=SIDES)
-    sketch.box((-0.6, 0.0, d - 0.2), (0.6, 1.85, d + 0.05), DARK, at=at, faces=SOUTH,
-               levels=(0.2, ENDLESS))
+    sketch.box(
+        (-0.6, 0.0, d - 0.2), (0.6, 1.85, d + 0.05), DARK, at=at, faces=SOUTH, levels=(0.2, ENDLESS)
+    )
     for x in (-0.72, 0.72):
-        sketch.box((x - 0.1, 0.0, d - 0.1), (x + 0.1, 2.0, d + 0.1), OLD_WOOD, at=at,
-                   faces=STANDING & ~NORTH, levels=(0.5, ENDLESS))
+        sketch.box(
+            (x - 0.1, 0.0, d - 0.1),
+            (x + 0.1, 2.0, d + 0.1),
+            OLD_WOOD,
+            at=at,
+            faces=STANDING & ~NORTH,
+            levels=(0.5, ENDLESS),
+        )
     e = 0.7
     y, top = tall - 0.35, tall + ridge
     r = w - d * 0.8
     straw = THATCH.shaded(dice.between(0.78, 1.08))
     p = {
-        "sw": (-w - e, y, d + e), "se": (w + e, y, d + e),
-        "ne": (w + e, y, -d - e), "nw": (-w - e, y, -d - e),
-        "a": (-r, top, 0.0), "b": (r, top, 0.0),
+        "sw": (-w - e, y, d + e),
+        "se": (w + e, y, d + e),
+        "ne": (w + e, y, -d - e),
+        "nw": (-w - e, y, -d - e),
     }
-    narrow = 0.05
-    a2, b2 = (-r, top, narrow), (r, top, narrow)
-    a3, b3 = (-r, top, -narrow), (r, top, -narrow)
+    # the long slopes meet in the ridge; the hips end in a short edge across it
+    a, b, e = (-r, top, 0.0), (r, top, 0.0), 0.02
+    a2, b2, a3, b3 = (-r, top, e), (r, top, e), (-r, top, -e), (r, top, -e)
     for corners in (
-        (p["sw"], p["se"], b2, a2),
-        (p["ne"], p["nw"], a3, b3),
+        (p["sw"], p["se"], b, a),
+        (p["ne"], p["nw"], a, b),
         (p["se"], p["ne"], b3, b2),
         (p["nw"], p["sw"], a2, a3),
         (p["nw"], p["ne"], p["se"], p["sw"]),
     ):
         sketch.quad(corners, straw, at=at)
-    sketch.box((-r - 0.25, top - 0.25, -0.28), (r + 0.25, top + 0.1, 0.28), straw.shaded(0.75),
-               at=at, taper=(0.1, 0.14), levels=(0.45, ENDLESS))
+    sketch.box(
+        (-r - 0.25, top - 0.25, -0.28),
+        (r + 0.25, top + 0.1, 0.28),
+        straw.shaded(0.75),
+        at=at,
+        taper=(0.1, 0.14),
+        levels=(0.45, ENDLESS),
+    )
 
 
 def houses(sketch: Sketch, layout: Layout) -> None:

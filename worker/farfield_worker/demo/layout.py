@@ -315,8 +315,8 @@ def _causeways(layout: Layout) -> None:
     for sign in (-1, 1):
         for vertical in (True, False):
             stops = (edge, *[g for gap in GAPS for g in (gap - 4, gap + 4)], CAUSEWAY_END)
-            for a, b in zip(stops[::2], stops[1::2], strict=True):
-                a, b = sorted((sign * a, sign * b))
+            for start, stop in zip(stops[::2], stops[1::2], strict=True):
+                a, b = sorted((sign * start, sign * stop))
                 w = CAUSEWAY
                 layout.paint(Rect(-w, a, w, b) if vertical else Rect(a, -w, b, w), Ground.CAUSEWAY)
             for gap in GAPS:

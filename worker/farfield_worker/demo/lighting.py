@@ -1,9 +1,9 @@
-"""Light baked into the vertex colours: shade of the sky that walls take away, and the sun's shadows.
+"""Light baked into the vertex colours: the sky that walls take away, and the sun's shadows.
 
 The city's solid bodies are drawn into a map of heights. What a vertex sees of the sky is guessed
-from blurred heights around it, its sun from a walk over the map towards the sun (Sloan and Tevs call
-such walks height-field shadows). Farfield's light model knows no shadows; the factor stored here is
-shadowed light over unshadowed light for the light that the model had when the city was drawn.
+from blurred heights around it, its sun from a walk over the map towards the sun. Farfield's light
+model knows no shadows: the factor stored here is shadowed light over unshadowed light, for the
+constants that the model had when the city was drawn, so that the city's content never changes.
 """
 
 from __future__ import annotations

@@ -78,7 +78,7 @@ def rgb(code: str) -> Rgb:
 DARK = Look(Material.DARK, rgb("2a1f18"), grain=0.0)
 WOOD = Look(Material.WOOD, rgb("dcbc92"), grain=0.35)
 OLD_WOOD = Look(Material.WOOD, rgb("a88868"), grain=0.0)
-THATCH = Look(Material.THATCH, rgb("e0c890"), grain=0.6, rough=0.03)
+THATCH = Look(Material.THATCH, rgb("e0c890"), grain=0.6)
 STONE = Look(Material.STONE, rgb("eee2cc"), grain=0.35, rough=0.015)
 RED_STONE = Look(Material.STONE, rgb("d8947c"), grain=0.35, rough=0.015)
 ADOBE = Look(Material.PLASTER, rgb("f4ecdc"), grain=0.14)
@@ -95,10 +95,15 @@ CLAY = Look(Material.STUCCO, rgb("b5653c"), grain=0.0)
 WALLS = tuple(
     rgb(code)
     for code in (
-        "f3ead8 efe2c8 f6f0e2 ead6b4 e6cba0 ecd9bd dcb88a e8c4a0 d9a57c e3b79a cf9a72 c98366".split()
+        *("f3ead8", "efe2c8", "f6f0e2", "ead6b4", "e6cba0", "ecd9bd"),
+        *("dcb88a", "e8c4a0", "d9a57c", "e3b79a", "cf9a72", "c98366"),
     )
 )
-BANDS = tuple(rgb(code) for code in "a8402c b5523a 2f8a88 c98a34 7c3324 3d6d96".split())
+BANDS = tuple(rgb(code) for code in ["a8402c", "b5523a", "2f8a88", "c98a34", "7c3324", "3d6d96"])
 CLOTHS = tuple(
-    rgb(code) for code in "e8dcc0 c8452f e0a23c 3a8f93 efe6d4 8d3a55 d9743c 5a7f48".split()
+    rgb(code)
+    for code in (
+        *("e8dcc0", "c8452f", "e0a23c", "3a8f93"),
+        *("efe6d4", "8d3a55", "d9743c", "5a7f48"),
+    )
 )

@@ -1,7 +1,7 @@
 """The parts of the city, their shares of the triangles, and the level that gives a wanted number.
 
-Each part has a fixed share, and a level of its own, found by bisection, at which it has its share of
-the wanted number; so the near and the far, walls and leaves grow alike.
+Each part has a fixed share, and a level of its own, found by bisection, at which it has its share
+of the wanted number; so the near and the far, walls and leaves grow alike.
 """
 
 from __future__ import annotations
@@ -13,14 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from farfield_worker.demo import ground
+from farfield_worker.demo.forest import Forest
 from farfield_worker.demo.houses import houses
 from farfield_worker.demo.layout import plan
 from farfield_worker.demo.lighting import CELL, HeightMap
-from farfield_worker.demo.plants import Forest, plant
+from farfield_worker.demo.plants import plant
 from farfield_worker.demo.sketch import Sketch
 from farfield_worker.demo.surfaces import Surfaces, concatenate
-from farfield_worker.demo.tessellate import divisions, triangle_count
 from farfield_worker.demo.temples import temples
+from farfield_worker.demo.tessellate import divisions, triangle_count
 from farfield_worker.demo.waterside import waterside
 
 Counts = NDArray[np.int64]
@@ -49,7 +50,10 @@ class City:
 def build() -> City:
     """Draw the whole city."""
     layout = plan()
-    sketches = {name: Sketch(900 + k) for k, name in enumerate(SHARES)}
+    sketches = {
+        name: Sketch(900 + k, spread=name in ("temples", "waterside"))
+        for k, name in enumerate(SHARES)
+    }
     houses(sketches["houses"], layout)
     temples(sketches["temples"], layout)
     waterside(sketches["waterside"], layout)

@@ -1,4 +1,4 @@
-"""Stepped pyramids: tiers with cornices, stairs between balustrades, shrines on top.
+"""Stepped pyramids: tiers of slope and panel, stairs between balustrades, shrines on top.
 
 Local frame: the stairs are on the +z side; y = 0 is the ground the pyramid stands on.
 """
@@ -7,36 +7,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from farfield_worker.demo.friezes import BANDS, DISKS, SKULLS, STEPPED_FRET, STRIPES
+from farfield_worker.demo.friezes import DISKS, SKULLS, STEPPED_FRET, STRIPES
 from farfield_worker.demo.hashing import Dice
 from farfield_worker.demo.looks import (
     BLUE,
-    DARK,
     LIME,
     OCHRE,
-    OLD_WOOD,
     PAVING,
     RED,
     STONE,
     TURQUOISE,
-    WOOD,
     Look,
-    Material,
-    rgb,
 )
+from farfield_worker.demo.shrines import around, brazier, frieze, shrine
 from farfield_worker.demo.sketch import (
-    ALWAYS,
     CLOSED,
     NORTH,
-    SOUTH,
-    STANDING,
-    Levels,
     Place,
     Sketch,
 )
 from farfield_worker.demo.surfaces import ENDLESS
-
-PAINT = Look(Material.PAINT, rgb("ffffff"), grain=0.3)
 
 
 @dataclass(frozen=True)
@@ -53,24 +43,6 @@ class Pyramid:
     stairs: int = 1
 
 
-def frieze(
-    s: Sketch, at: Place, x0: float, x1: float, y: float, z: float, tall: float, row: int,
-    levels: Levels = ALWAYS,
-) -> None:
-    """A painted band on a wall that looks to local +z."""
-    top, bottom = BANDS[row]
-    repeats = round((x1 - x0) / tall) / 4
-    s.quad(((x0, y, z), (x1, y, z), (x1, y + tall, z), (x0, y + tall, z)), PAINT, at=at,
-           uv=(0.0, max(repeats, 0.25), bottom, top), levels=levels)
-
-
-def around(at: Place, quarter: int, half: tuple[float, float]) -> tuple[Place, float, float]:
-    """Frame of one side of a body at `at`: same origin, turned; its half length and distance."""
-    turned = Place(at.x, at.y, at.z, (at.quarter + quarter) % 4)
-    hx, hz = half
-    return (turned, hx, hz) if quarter % 2 == 0 else (turned, hz, hx)
-
-
 def pyramid(s: Sketch, at: Place, p: Pyramid, dice: Dice) -> None:
     """Build one pyramid with everything on it."""
     rise = p.height / p.tiers
@@ -79,8 +51,9 @@ def pyramid(s: Sketch, at: Place, p: Pyramid, dice: Dice) -> None:
     for k in range(p.tiers):
         y = k * rise
         wall = p.wall.shaded(1.0 - 0.04 * (k % 2))
-        s.box((-hx, y - 0.3, -hz), (hx, y + rise, hz), wall, at=at, taper=lean, top=PAVING,
-              solid=True)
+        s.box(
+            (-hx, y - 0.3, -hz), (hx, y + rise, hz), wall, at=at, taper=lean, top=PAVING, solid=True
+        )
         _panel(s, at, hx - lean * 0.55, hz - lean * 0.55, y + rise, rise, p, k)
         _bosses(s, at, hx, hz, y, rise, lean, wall, dice)
         hx, hz = hx - lean - setback, hz - lean - setback
@@ -96,12 +69,25 @@ def _panel(
     tall = rise * 0.45
     edge = min(0.3, tall * 0.16)
     foot = y - tall
-    s.box((-hx - 0.1, foot, -hz - 0.1), (hx + 0.1, y + 0.1, hz + 0.1), LIME.shaded(0.94), at=at,
-          top=PAVING, faces=CLOSED)
+    s.box(
+        (-hx - 0.1, foot, -hz - 0.1),
+        (hx + 0.1, y + 0.1, hz + 0.1),
+        LIME.shaded(0.94),
+        at=at,
+        top=PAVING,
+        faces=CLOSED,
+    )
     level = 0.12 + 0.02 * k
     for low, high in ((foot - 0.05, foot + edge), (y + 0.1 - edge, y + 0.16)):
-        s.box((-hx - 0.3, low, -hz - 0.3), (hx + 0.3, high, hz + 0.3), LIME, at=at, top=PAVING,
-              faces=CLOSED, levels=(level, ENDLESS))
+        s.box(
+            (-hx - 0.3, low, -hz - 0.3),
+            (hx + 0.3, high, hz + 0.3),
+            LIME,
+            at=at,
+            top=PAVING,
+            faces=CLOSED,
+            levels=(level, ENDLESS),
+        )
     row = (STEPPED_FRET, DISKS)[k % 2]
     for quarter in range(4):
         frame, half, reach = around(at, quarter, (hx, hz))
@@ -109,12 +95,28 @@ def _panel(
         spans = [(-half + 0.2, -gap), (gap, half - 0.2)] if gap else [(-half + 0.2, half - 0.2)]
         for a, b in spans:
             if b - a > 1.5:
-                frieze(s, frame, a, b, foot + edge, reach + 0.16, tall - 2 * edge + 0.1, row,
-                       levels=(level, ENDLESS))
+                frieze(
+                    s,
+                    frame,
+                    a,
+                    b,
+                    foot + edge,
+                    reach + 0.16,
+                    tall - 2 * edge + 0.1,
+                    row,
+                    levels=(level, ENDLESS),
+                )
 
 
 def _bosses(
-    s: Sketch, at: Place, hx: float, hz: float, y: float, rise: float, lean: float, wall: Look,
+    s: Sketch,
+    at: Place,
+    hx: float,
+    hz: float,
+    y: float,
+    rise: float,
+    lean: float,
+    wall: Look,
     dice: Dice,
 ) -> None:
     """Stones that stand out of the sloping walls."""
@@ -132,9 +134,14 @@ def _bosses(
                     continue
                 z = reach - lean * t
                 a, b = dice.between(0.2, 0.45), dice.between(0.14, 0.24)
-                s.box((x - a, y + t * rise - b, z - 0.3), (x + a, y + t * rise + b, z + 0.09),
-                      wall.shaded(dice.between(0.82, 1.12))._replace(grain=0.0), at=frame,
-                      faces=CLOSED & ~NORTH, levels=(level, ENDLESS))
+                s.box(
+                    (x - a, y + t * rise - b, z - 0.3),
+                    (x + a, y + t * rise + b, z + 0.09),
+                    wall.shaded(dice.between(0.82, 1.12))._replace(grain=0.0),
+                    at=frame,
+                    faces=CLOSED & ~NORTH,
+                    levels=(level, ENDLESS),
+                )
 
 
 def _stairs(s: Sketch, at: Place, p: Pyramid, back: float) -> None:
@@ -155,10 +162,18 @@ def _stairs(s: Sketch, at: Place, p: Pyramid, back: float) -> None:
                 z2 -= 2.0 if i == n - 1 else 0.0
                 y1 += 0.2 if i == n - 1 else 0.0
                 tone = STONE.shaded(1.02 if i % 2 else 0.95)._replace(rough=0.0)
-                s.quad(((x0, y0, z1), (x1, y0, z1), (x1, y1, z1), (x0, y1, z1)), tone, at=at,
-                       levels=(low, high))
-                s.quad(((x0, y1, z1), (x1, y1, z1), (x1, y1, z2), (x0, y1, z2)), PAVING, at=at,
-                       levels=(low, high))
+                s.quad(
+                    ((x0, y0, z1), (x1, y0, z1), (x1, y1, z1), (x0, y1, z1)),
+                    tone,
+                    at=at,
+                    levels=(low, high),
+                )
+                s.quad(
+                    ((x0, y1, z1), (x1, y1, z1), (x1, y1, z2), (x0, y1, z2)),
+                    PAVING,
+                    at=at,
+                    levels=(low, high),
+                )
     for k in range(p.stairs + 1):
         x = -p.stair_half + k * flight
         _balustrade(s, at, x - rail * 0.5, x + rail * 0.5, back, run, p.height)
@@ -184,112 +199,72 @@ def _balustrade(
     x = (a + b) / 2
     # the head: jaw, muzzle, brow, two eyes
     stone = TURQUOISE.shaded(0.8)
-    s.box((x - w * 1.25, -0.2, z0 - 0.3), (x + w * 1.25, 0.75, z0 + 2.0), stone, at=at,
-          taper=(0.1, 0.15), levels=(0.3, ENDLESS))
-    s.box((x - w * 1.1, 0.6, z0 - 0.3), (x + w * 1.1, 1.35, z0 + 1.6), stone.shaded(1.15), at=at,
-          taper=(0.15, 0.25), levels=(0.3, ENDLESS))
+    s.box(
+        (x - w * 1.25, -0.2, z0 - 0.3),
+        (x + w * 1.25, 0.75, z0 + 2.0),
+        stone,
+        at=at,
+        taper=(0.1, 0.15),
+        levels=(0.3, ENDLESS),
+    )
+    s.box(
+        (x - w * 1.1, 0.6, z0 - 0.3),
+        (x + w * 1.1, 1.35, z0 + 1.6),
+        stone.shaded(1.15),
+        at=at,
+        taper=(0.15, 0.25),
+        levels=(0.3, ENDLESS),
+    )
     for side in (-1, 1):
-        s.box((x + side * w * 1.12 - 0.14, 0.75, z0 + 0.5), (x + side * w * 1.12 + 0.14, 1.1, z0 + 0.9),
-              LIME, at=at, levels=(0.7, ENDLESS))
-        s.box((x + side * w * 0.6 - 0.1, 0.3, z0 + 1.9), (x + side * w * 0.6 + 0.1, 0.75, z0 + 2.12),
-              LIME, at=at, levels=(0.8, ENDLESS))
+        s.box(
+            (x + side * w * 1.12 - 0.14, 0.75, z0 + 0.5),
+            (x + side * w * 1.12 + 0.14, 1.1, z0 + 0.9),
+            LIME,
+            at=at,
+            levels=(0.7, ENDLESS),
+        )
+        s.box(
+            (x + side * w * 0.6 - 0.1, 0.3, z0 + 1.9),
+            (x + side * w * 0.6 + 0.1, 0.75, z0 + 2.12),
+            LIME,
+            at=at,
+            levels=(0.8, ENDLESS),
+        )
 
 
 def _crown(s: Sketch, at: Place, p: Pyramid, hx: float, hz: float, dice: Dice) -> None:
     """Shrines, braziers and a stone on the platform."""
     top = Place(at.x, at.y + p.height, at.z, at.quarter)
-    colors = ((RED, SKULLS, 0), (BLUE, STRIPES, 1)) if p.shrines == 2 else (
-        (dice.pick((RED, OCHRE, TURQUOISE, BLUE)), dice.pick((SKULLS, DISKS, STRIPES)), 2),
+    colors = (
+        ((RED, SKULLS, 0), (BLUE, STRIPES, 1))
+        if p.shrines == 2
+        else ((dice.pick((RED, OCHRE, TURQUOISE, BLUE)), dice.pick((SKULLS, DISKS, STRIPES)), 2),)
     )
     room = 2 * hx / len(colors)
     for k, (paint, row, style) in enumerate(colors):
         x = -hx + (k + 0.5) * room
         w = room * 0.40
         d = hz * 0.52
-        shrine(s, top, x, -hz + d + 0.7, w, d, p.height * (0.44 if p.height > 20 else 0.55), paint,
-               row, style)
+        shrine(
+            s,
+            top,
+            x,
+            -hz + d + 0.7,
+            w,
+            d,
+            p.height * (0.38 if p.height > 20 else 0.55),
+            paint,
+            row,
+            style,
+        )
         stone = Place(top.x, top.y, top.z, top.quarter)
-        s.box((x - 0.4, -0.1, hz * 0.35), (x + 0.4, 0.8, hz * 0.35 + 0.6), STONE, at=stone,
-              levels=(0.5, ENDLESS))
+        s.box(
+            (x - 0.4, -0.1, hz * 0.35),
+            (x + 0.4, 0.8, hz * 0.35 + 0.6),
+            STONE,
+            at=stone,
+            levels=(0.5, ENDLESS),
+        )
     for x in (-hx + 0.8, hx - 0.8):
         if hx - 0.8 > p.stair_half + 1.0:
             brazier(s, top, x, hz - 0.8, 0.55 if p.height > 15 else 0.35)
-
-
-def brazier(s: Sketch, at: Place, x: float, z: float, r: float) -> None:
-    """A stone bowl with a fire."""
-    s.lathe((x, -0.05, z), r, r * 2.2, 4, STONE.shaded(0.85)._replace(rough=0.0), at=at, sides=8,
-            rings=4, levels=(0.2, ENDLESS))
-    s.lathe((x, r * 1.9, z), r * 0.7, r * 2.4, 6, Look(Material.PLASTER, rgb("ff9a2e")), at=at,
-            sides=6, rings=3, levels=(0.25, ENDLESS))
-
-
-def shrine(
-    s: Sketch, at: Place, x: float, z: float, w: float, d: float, tall: float, paint: Look,
-    row: int, style: int,
-) -> None:
-    """A temple house with a doorway to +z, a tall painted roof and a crest of merlons."""
-    here = Place(*at.point(x, 0.0, z), at.quarter)
-    body = tall * 0.5
-    s.box((-w, -0.2, -d), (w, body, d), LIME, at=here, solid=True)
-    door = w * 0.42
-    s.box((-door, 0.0, d - 0.5), (door, body * 0.8, d + 0.05), DARK, at=here, faces=SOUTH)
-    s.box((-door - 0.5, body * 0.8, d - 0.2), (door + 0.5, body * 0.8 + 0.45, d + 0.3), WOOD,
-          at=here, faces=CLOSED, levels=(0.35, ENDLESS))
-    for side in (-1, 1):
-        a, b = sorted((side * door, side * (door + 0.45)))
-        s.box((a, 0.0, d - 0.2), (b, body * 0.8, d + 0.22), paint, at=here, levels=(0.35, ENDLESS))
-    s.box((-w - 0.06, -0.2, -d - 0.06), (-door - 0.5, body * 0.22, d + 0.06), paint, at=here,
-          faces=STANDING, levels=(0.4, ENDLESS))
-    s.box((door + 0.5, -0.2, -d - 0.06), (w + 0.06, body * 0.22, d + 0.06), paint, at=here,
-          faces=STANDING, levels=(0.4, ENDLESS))
-    roof = tall * 0.5
-    lean = min(w, d) * 0.24
-    s.box((-w - 0.35, body - 0.05, -d - 0.35), (w + 0.35, body + 0.5, d + 0.35), LIME, at=here,
-          faces=CLOSED)
-    s.box((-w, body + 0.4, -d), (w, body + roof, d), paint, at=here, taper=lean)
-    for quarter in range(4):
-        frame, half, reach = around(here, quarter, (w, d))
-        z1 = reach + 0.06
-        band = min(1.6, roof * 0.3)
-        frieze(s, frame, -half + lean * 0.4, half - lean * 0.4, body + 0.62, z1 + 0.02, band, row,
-               levels=(0.2, ENDLESS))
-    top = body + roof
-    s.box((-w + lean - 0.2, top - 0.1, -d + lean - 0.2), (w - lean + 0.2, top + 0.45, d - lean + 0.2),
-          LIME, at=here, faces=CLOSED)
-    crest(s, here, w - lean, d - lean, top + 0.44, 0.9 if tall > 9 else 0.6, style)
-
-
-def crest(
-    s: Sketch, at: Place, hx: float, hz: float, y: float, tall: float, style: int
-) -> None:
-    """Merlons around the top of a roof."""
-    for quarter in range(4):
-        frame, half, reach = around(at, quarter, (hx, hz))
-        count = max(3, int(2 * half / (tall * 1.15)))
-        for k in range(count):
-            x = (k + 0.5) / count * 2 * half - half
-            if abs(x) > half - 0.35 and quarter % 2:
-                continue
-            e = half / count * 0.62
-            s.box((x - e, y - 0.05, reach - 0.3), (x + e, y + tall, reach), LIME.shaded(0.97),
-                  at=frame, taper=(e * (0.5 if style != 1 else 0.0), 0.0), levels=(0.3, ENDLESS))
-            if style == 1:
-                s.box((x - e * 0.5, y + tall - 0.02, reach - 0.3), (x + e * 0.5, y + tall * 1.4, reach),
-                      LIME, at=frame, levels=(0.6, ENDLESS))
-
-
-def banner(s: Sketch, at: Place, tall: float, dice: Dice) -> None:
-    """A pole with a long flag of cloth and feathers."""
-    s.box((-0.5, -0.1, -0.5), (0.5, 0.5, 0.5), STONE, at=at, levels=(0.4, ENDLESS))
-    s.box((-0.09, 0, -0.09), (0.09, tall, 0.09), OLD_WOOD, at=at, levels=(0.15, ENDLESS))
-    s.box((-0.05, tall - 0.2, -0.06), (1.5, tall - 0.08, 0.06), OLD_WOOD, at=at, faces=CLOSED,
-          levels=(0.6, ENDLESS))
-    cloth = Look(Material.CLOTH, dice.pick((rgb("c8382c"), rgb("2f8f94"), rgb("e0a030"))), grain=0.8)
-    drop = tall * 0.5
-    s.quad(((0.12, tall - drop, 0.0), (1.4, tall - drop, 0.1), (1.4, tall - 0.14, 0.0),
-            (0.12, tall - 0.14, 0.0)), cloth, at=at, uv=(0, 1, 2.0, 0), sag=(0.0, 0.0, 0.35),
-           levels=(0.15, ENDLESS))
-
-
-__all__ = ["Pyramid", "around", "banner", "brazier", "crest", "frieze", "pyramid", "shrine"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from farfield_worker.demo.hashing import uniform
+from farfield_worker.demo.hashing import Dice, uniform
 from farfield_worker.demo.looks import TILE, Look, Material
 from farfield_worker.demo.surfaces import ENDLESS, Floats, Kind, Surfaces, concatenate, linear
 
@@ -59,14 +59,23 @@ class Sketch:
     """Collects shapes; `surfaces()` turns them into a table.
 
     `solids` are the boxes that cast shadows in the baked light: (n, 5) x0, z0, x1, z1, top.
+    With `spread` every place has levels of its own, up to a third higher or lower, so that things
+    of one kind do not all change at the same level.
     """
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, spread: bool = False) -> None:
         self._seed = seed
+        self._spread = spread
         self._boxes: list[tuple[float, ...]] = []
         self._shapes: list[tuple[float, ...]] = []
         self._tables: list[Surfaces] = []
         self.solids: list[tuple[float, float, float, float, float]] = []
+
+    def _levels(self, at: Place, levels: Levels) -> Levels:
+        if not self._spread:
+            return levels
+        factor = Dice(self._seed, round(at.x * 8), round(at.z * 8)).between(0.75, 1.33)
+        return levels[0] * factor, levels[1] * factor
 
     def box(
         self,
@@ -82,7 +91,7 @@ class Sketch:
         solid: bool = False,
         turn: tuple[float, float] = (1.0, 0.0),
     ) -> None:
-        """Add a box; its top is narrower by `taper` on each side; `turn` is (cos, sin) of its yaw."""
+        """Add a box, narrower by `taper` on each side at its top, of yaw `turn` (cos, sin)."""
         (x0, y0, z0), (x1, y1, z1) = at.point(*low), at.point(*high)
         (x0, x1), (z0, z1) = sorted((x0, x1)), sorted((z0, z1))
         ax, az = (x1 - x0) / 2, (z1 - z0) / 2
@@ -91,10 +100,13 @@ class Sketch:
             tx, tz = tz, tx
         faces = turned_faces(faces, at.quarter)
         lid = top or look
+        levels = self._levels(at, levels)
         self._boxes.append(
-            (x0 + ax, z0 + az, y0, y1, ax, az, ax - tx, az - tz, *turn)
-            + (look.material, *look.tint, lid.material, *lid.tint)
-            + (look.grain, lid.grain, look.rough, *levels, faces)
+            (
+                *(x0 + ax, z0 + az, y0, y1, ax, az, ax - tx, az - tz, *turn),
+                *(look.material, *look.tint, lid.material, *lid.tint),
+                *(look.grain, lid.grain, look.rough, *levels, faces),
+            )
         )
         if solid:
             self.solids.append((x0, z0, x1, z1, y1))
@@ -114,6 +126,7 @@ class Sketch:
         `uv` is u at its left and right and v at its bottom and top; otherwise metres are used.
         """
         p = [at.point(*c) for c in corners]
+        levels = self._levels(at, levels)
         kind = Kind.FLAT if sag is None else Kind.SAGGING
         self._shape(kind, p, sag or (0.0, 0.0, 0.0), look, uv, levels)
 
@@ -130,8 +143,10 @@ class Sketch:
         frame = (1.0, *uv) if uv else (0.0, 0.0, 0.0, 0.0, 0.0)
         flat = [c for p in points for c in p]
         self._shapes.append(
-            (kind, *flat, *extra, look.material, *look.tint, look.grain, look.rough)
-            + (*levels, *segments, *frame)
+            (
+                *(kind, *flat, *extra, look.material, *look.tint, look.grain, look.rough),
+                *(*levels, *segments, *frame),
+            )
         )
 
     def lathe(
@@ -146,12 +161,31 @@ class Sketch:
         sides: float = 8.0,
         rings: float = 1.0,
         levels: Levels = ALWAYS,
+        lid: tuple[float, float, Look] | None = None,
     ) -> None:
-        """Add a solid of revolution; see `tessellate.PROFILES`."""
+        """Add a solid of revolution; see `tessellate.PROFILES`.
+
+        `lid` closes it: radius and height of a disc in parts of the whole, and its look.
+        """
+        if lid is not None:
+            part, up, cover = lid
+            x, y, z = base
+            self.lathe(
+                (x, y + height * up, z),
+                radius * part,
+                0.02,
+                8,
+                cover,
+                at=at,
+                sides=sides,
+                rings=0.5,
+                levels=levels,
+            )
+        levels = self._levels(at, levels)
         points = (at.point(*base), (radius, height, float(profile)), (0.0,) * 3, (0.0,) * 3)
         girth = 6.3 * radius / _TILES[look.material]
         uv = (0.0, girth, 0.0, -height / float(_TILES[look.material]))
-        self._shape(Kind.LATHE, points, (0.0,) * 3, look, uv, levels, (sides, rings))  # type: ignore[arg-type]
+        self._shape(Kind.LATHE, points, (0.0,) * 3, look, uv, levels, (sides, rings))
 
     def hull(
         self,
@@ -296,6 +330,10 @@ def _shapes(s: Floats, seed: int) -> Surfaces:
         tint=linear(s[:, 17:20]),
         rough=s[:, 21],
         segments=segments,
-        rank=uniform(seed, 14, np.arange(n)[:, None], np.arange(2)[None]),
+        rank=np.where(  # what is round keeps its number of sides, so that lids fit
+            (s[:, 0] == Kind.LATHE)[:, None],
+            0.5,
+            uniform(seed, 14, np.arange(n)[:, None], np.arange(2)[None]),
+        ),
         levels=s[:, 22:24],
     )

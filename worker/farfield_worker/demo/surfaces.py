@@ -1,8 +1,8 @@
 """Surfaces: what the city is made of, before it is cut into triangles.
 
-A surface is a grid of patches over (u, v) in [0, 1]^2, u to the right and v upwards for who looks at
-its front. It says how many segments it would like at level 1 and at which levels it exists, so one
-table describes the city at every level of detail (see `levels`).
+A surface is a grid of patches over (u, v) in [0, 1]^2, u to the right and v upwards for who looks
+at its front. It says how many segments it would like at level 1 and at which levels it exists, so
+one table describes the city at every level of detail.
 """
 
 from __future__ import annotations

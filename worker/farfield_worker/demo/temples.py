@@ -1,16 +1,14 @@
-"""The sacred precinct, palaces and the shrines of the quarters."""
+"""The sacred precinct."""
 
 from __future__ import annotations
 
-from farfield_worker.demo.friezes import DISKS, SKULLS, STEPPED_FRET
+from farfield_worker.demo.friezes import SKULLS, STEPPED_FRET
+from farfield_worker.demo.halls import hall, palace, quarter_shrine
 from farfield_worker.demo.hashing import Dice
 from farfield_worker.demo.layout import HEIGHTS, PRECINCT, Ground, Layout, Rect
 from farfield_worker.demo.looks import (
-    BANDS,
-
     DARK,
     LIME,
-    OCHRE,
     OLD_WOOD,
     PAVING,
     RED,
@@ -18,12 +16,12 @@ from farfield_worker.demo.looks import (
     STONE,
     THATCH,
     TURQUOISE,
-    WALLS,
     Look,
     Material,
     rgb,
 )
-from farfield_worker.demo.pyramids import Pyramid, banner, brazier, crest, frieze, pyramid
+from farfield_worker.demo.pyramids import Pyramid, pyramid
+from farfield_worker.demo.shrines import banner, brazier, crest, frieze
 from farfield_worker.demo.sketch import (
     CLOSED,
     NORTH,
@@ -34,7 +32,6 @@ from farfield_worker.demo.sketch import (
 )
 from farfield_worker.demo.surfaces import ENDLESS
 
-ROOF = LIME.tinted(*rgb("e8d8b8"))
 PLAZA = HEIGHTS[Ground.PLAZA]
 
 
@@ -42,9 +39,9 @@ def temples(s: Sketch, layout: Layout) -> None:
     """Build all of them."""
     _precinct(s, layout)
     for k, area in enumerate(layout.shrines):
-        _quarter_shrine(s, layout, area, Dice(91, k))
+        quarter_shrine(s, layout, area, Dice(91, k))
     for k, name in enumerate(("palace", "old palace")):
-        _palace(s, layout, layout.places[name], Dice(92, k))
+        palace(s, layout, layout.places[name], Dice(92, k))
 
 
 def _stand(layout: Layout, x: float, z: float, hx: float, hz: float) -> None:
@@ -57,8 +54,13 @@ def _precinct(s: Sketch, layout: Layout) -> None:
     s.box((-50, PLAZA - 0.5, -96), (50, PLAZA + 2.6, -8), STONE, top=PAVING, taper=0.6, solid=True)
     for k, (y, z) in enumerate(((0.65, -5.2), (1.3, -5.9), (1.95, -6.6), (2.6, -7.3))):
         half = 22 - 0.05 * k
-        s.box((-half, PLAZA - 0.3, -8.4), (half, PLAZA + y - 0.03, z + 0.7),
-              LIME.shaded(0.95 + 0.01 * k), top=PAVING, faces=STANDING & ~NORTH)
+        s.box(
+            (-half, PLAZA - 0.3, -8.4),
+            (half, PLAZA + y - 0.03, z + 0.7),
+            LIME.shaded(0.95 + 0.01 * k),
+            top=PAVING,
+            faces=STANDING & ~NORTH,
+        )
     _stand(layout, 0, -52, 49, 43)
     pyramid(s, Place(0.0, PLAZA + 2.6, -55.0, 0), great, dice)
     for x, z, half, tall, tiers, quarter, wall in (
@@ -75,17 +77,23 @@ def _precinct(s: Sketch, layout: Layout) -> None:
     _round_temple(s, layout, 0.0, 38.0)
     _ball_court(s, -48.0, 66.0)
     _skull_rack(s, 46.0, 70.0)
-    for x, z, w, d, quarter in ((-80, 62, 20, 9, 1), (80, 64, 20, 9, 3)):
-        _hall(s, Place(x, PLAZA, z, quarter), w, d, 6.2, Dice(94, x))
+    for side, z, quarter in ((-80, 62, 1), (80, 64, 3)):
+        hall(s, Place(side, PLAZA, z, quarter), 20.0, 9.0, 6.2, Dice(94, side))
     _walls(s, dice)
-    for x in (-24.0, -12.0, 12.0, 24.0):
-        for z in (12.0, 60.0, 84.0):
+    for east in (-24.0, -12.0, 12.0, 24.0):
+        for south in (12.0, 60.0, 84.0):
             at = Place(0.0, PLAZA, 0.0, 0)
-            s.box((x - 0.8, -0.1, z - 0.8), (x + 0.8, 0.9, z + 0.8), STONE, at=at, taper=0.1)
-            brazier(s, Place(0.0, PLAZA + 0.9, 0.0, 0), x, z, 0.5)
-    for x in (-17.5, 17.5):
-        for z in (24.0, 50.0, 74.0, 98.0):
-            banner(s, Place(x, PLAZA, z, 0), 9.0, dice)
+            s.box(
+                (east - 0.8, -0.1, south - 0.8),
+                (east + 0.8, 0.9, south + 0.8),
+                STONE,
+                at=at,
+                taper=0.1,
+            )
+            brazier(s, Place(0.0, PLAZA + 0.9, 0.0, 0), east, south, 0.5)
+    for east in (-17.5, 17.5):
+        for south in (24.0, 50.0, 74.0, 98.0):
+            banner(s, Place(east, PLAZA, south, 0), 9.0, dice)
 
 
 def _walls(s: Sketch, dice: Dice) -> None:
@@ -93,36 +101,82 @@ def _walls(s: Sketch, dice: Dice) -> None:
     at = [Place(0.0, PLAZA, 0.0, q) for q in range(4)]
     reach, gate, tall = PRECINCT - 1.0, 10.0, 3.4
     for quarter, frame in enumerate(at):
-        for a, b in ((-reach, -gate), (gate, reach)):
-            if quarter % 2:
-                a, b = (a + 1.6 if a < -20 else a), (b - 1.6 if b > 20 else b)
-            s.box((a, -1.2, reach - 1.6), (b, tall, reach), STONE.tinted(*rgb("d9c6a2")), at=frame,
-                  solid=True)
-            s.box((a + 0.05, tall - 0.7, reach - 1.7), (b - 0.05, tall + 0.25, reach + 0.14), LIME, at=frame,
-                  faces=CLOSED, levels=(0.25, ENDLESS))
-            frieze(s, frame, a + 0.3, b - 0.3, tall - 0.62, reach + 0.2, 0.75, STEPPED_FRET,
-                   levels=(0.35, ENDLESS))
+        end = reach - 1.6 * (quarter % 2)  # walls that meet in a corner
+        for a, b in ((-end, -gate), (gate, end)):
+            s.box(
+                (a, -1.2, reach - 1.6),
+                (b, tall, reach),
+                STONE.tinted(*rgb("d9c6a2")),
+                at=frame,
+                solid=True,
+            )
+            s.box(
+                (a + 0.05, tall - 0.7, reach - 1.7),
+                (b - 0.05, tall + 0.25, reach + 0.14),
+                LIME,
+                at=frame,
+                faces=CLOSED,
+                levels=(0.25, ENDLESS),
+            )
+            frieze(
+                s,
+                frame,
+                a + 0.3,
+                b - 0.3,
+                tall - 0.62,
+                reach + 0.2,
+                0.75,
+                STEPPED_FRET,
+                levels=(0.35, ENDLESS),
+            )
             count = int((b - a) / 2.2)
             for k in range(count):
                 x = a + (k + 0.5) * (b - a) / count
-                s.box((x - 0.55, tall + 0.2, reach - 1.2), (x + 0.55, tall + 1.15, reach - 0.3),
-                      LIME.shaded(0.95), at=frame, taper=(0.3, 0.15),
-                      levels=(0.3 + 0.3 * dice.between(0, 1), ENDLESS))
+                s.box(
+                    (x - 0.55, tall + 0.2, reach - 1.2),
+                    (x + 0.55, tall + 1.15, reach - 0.3),
+                    LIME.shaded(0.95),
+                    at=frame,
+                    taper=(0.3, 0.15),
+                    levels=(0.3 + 0.3 * dice.between(0, 1), ENDLESS),
+                )
             # a serpent's coils along the wall
             for k in range(int((b - a) / 3.0)):
                 x = a + (k + 0.5) * 3.0
-                s.box((x - 0.5, 0.9, reach - 0.1), (x + 0.5, 1.7, reach + 0.3),
-                      TURQUOISE.shaded(0.85), at=frame, taper=(0.2, 0.1),
-                      levels=(dice.between(0.5, 1.2), ENDLESS))
+                s.box(
+                    (x - 0.5, 0.9, reach - 0.1),
+                    (x + 0.5, 1.7, reach + 0.3),
+                    TURQUOISE.shaded(0.85),
+                    at=frame,
+                    taper=(0.2, 0.1),
+                    levels=(dice.between(0.5, 1.2), ENDLESS),
+                )
         for rise, run in ((-0.27, 1.6), (-0.53, 2.2)):
             half = gate + 0.05 * run
-            s.box((-half, -1.0, reach + 1.0), (half, rise, reach + run), STONE, at=frame,
-                  top=PAVING, faces=STANDING & ~NORTH)
+            s.box(
+                (-half, -1.0, reach + 1.0),
+                (half, rise, reach + run),
+                STONE,
+                at=frame,
+                top=PAVING,
+                faces=STANDING & ~NORTH,
+            )
         for x in (-gate - 1.5, gate + 1.5):
-            s.box((x - 2.2, -1.2, reach - 2.6), (x + 2.2, tall + 2.6, reach + 1.0), LIME, at=frame,
-                  taper=0.2, solid=True)
-            s.box((x - 2.4, tall + 2.55, reach - 2.8), (x + 2.4, tall + 3.1, reach + 1.2), RED,
-                  at=frame, faces=CLOSED)
+            s.box(
+                (x - 2.2, -1.2, reach - 2.6),
+                (x + 2.2, tall + 2.6, reach + 1.0),
+                LIME,
+                at=frame,
+                taper=0.2,
+                solid=True,
+            )
+            s.box(
+                (x - 2.4, tall + 2.55, reach - 2.8),
+                (x + 2.4, tall + 3.1, reach + 1.2),
+                RED,
+                at=frame,
+                faces=CLOSED,
+            )
             here = Place(*frame.point(x, 0.0, reach - 0.8), frame.quarter)
             crest(s, here, 2.2, 1.8, tall + 3.05, 0.6, 0)
             frieze(s, here, -1.9, 1.9, tall + 0.9, 1.84, 1.0, SKULLS, levels=(0.2, ENDLESS))
@@ -133,22 +187,47 @@ def _round_temple(s: Sketch, layout: Layout, x: float, z: float) -> None:
     at = Place(x, PLAZA, z, 0)
     stone = STONE._replace(rough=0.0)
     for k, (r, y0, y1) in enumerate(((11.0, -0.3, 2.6), (9.2, 2.5, 5.2), (7.4, 5.1, 7.8))):
-        s.lathe((0, y0, 0), r, y1 - y0, 0, (stone, RED_STONE._replace(rough=0.0), stone)[k], at=at,
-                sides=22, rings=2)
-        s.lathe((0, y1, 0), r, 0.12, 1, PAVING, at=at, sides=22, rings=2)
-        s.lathe((0, y1 - 0.7, 0), r + 0.25, 0.75, 0, LIME, at=at, sides=22, rings=1,
-                levels=(0.25, ENDLESS))
+        s.lathe(
+            (0, y0, 0),
+            r,
+            y1 - y0,
+            0,
+            (stone, RED_STONE._replace(rough=0.0), stone)[k],
+            at=at,
+            sides=22,
+            rings=2,
+        )
+        s.lathe((0, y1 + 0.04, 0), r + 0.26, 0.1, 1, PAVING, at=at, sides=22, rings=2)
+        s.lathe(
+            (0, y1 - 0.7, 0),
+            r + 0.25,
+            0.75,
+            0,
+            LIME,
+            at=at,
+            sides=22,
+            rings=1,
+            levels=(0.25, ENDLESS),
+        )
     s.solids.append((x - 9, z - 9, x + 9, z + 9, PLAZA + 6.0))
     s.lathe((0, 7.7, 0), 4.6, 4.0, 0, LIME._replace(rough=0.0), at=at, sides=18, rings=2)
     s.lathe((0, 11.4, 0), 5.8, 6.5, 1, THATCH, at=at, sides=20, rings=5)
+    s.lathe((0, 11.38, 0), 5.8, 0.02, 7, THATCH.shaded(0.6), at=at, sides=20, rings=1)
     s.box((-1.1, 7.9, 4.0), (1.1, 10.6, 4.75), DARK, at=at, faces=SOUTH)
     n = 26
     for i in range(n):
         y0, y1 = 7.9 * i / n, 7.9 * (i + 1) / n
         z0 = 14.6 - 8.0 * i / n
         half = 2.6 - 0.01 * i
-        s.box((-half, y0 - 0.4, 5.0), (half, y1, z0), STONE.shaded(1.0 if i % 2 else 0.95), at=at,
-              top=PAVING, faces=STANDING & ~NORTH, levels=(0.0 if i % 3 == 2 else 0.35, ENDLESS))
+        s.box(
+            (-half, y0 - 0.4, 5.0),
+            (half, y1, z0),
+            STONE.shaded(1.0 if i % 2 else 0.95),
+            at=at,
+            top=PAVING,
+            faces=STANDING & ~NORTH,
+            levels=(0.0 if i % 3 == 2 else 0.35, ENDLESS),
+        )
 
 
 def _ball_court(s: Sketch, x: float, z: float) -> None:
@@ -160,8 +239,13 @@ def _ball_court(s: Sketch, x: float, z: float) -> None:
         a, b = sorted((side * 3.2, side * 5.2))
         s.box((a, -0.3, -18), (b, 1.2, 18), LIME, at=at, taper=(0.5, 0.2))
         here = Place(at.x, at.y, at.z, 0)
-        s.box((side * 5.4 - 0.3, 2.6, -0.7), (side * 5.4 + 0.3, 4.0, 0.7), RED, at=here,
-              levels=(0.4, ENDLESS))
+        s.box(
+            (side * 5.4 - 0.3, 2.6, -0.7),
+            (side * 5.4 + 0.3, 4.0, 0.7),
+            RED,
+            at=here,
+            levels=(0.4, ENDLESS),
+        )
         for end in (-1, 1):
             c, d = sorted((end * 22.0, end * 23.2))
             e, f = sorted((side * 1.5, side * 12.0))
@@ -172,9 +256,23 @@ def _skull_rack(s: Sketch, x: float, z: float) -> None:
     """The tzompantli: poles and crossbars over a carved platform."""
     at = Place(x, PLAZA, z, 0)
     s.box((-14, -0.3, -5), (14, 1.8, 5), STONE, at=at, top=PAVING, taper=0.2, solid=True)
-    for quarter, half, reach in ((0, 13.6, 5.05), (1, 4.8, 14.05), (2, 13.6, 5.05), (3, 4.8, 14.05)):
-        frieze(s, Place(x, PLAZA, z, quarter), -half, half, 0.3, reach, 1.2, SKULLS,
-               levels=(0.2, ENDLESS))
+    for quarter, half, reach in (
+        (0, 13.6, 5.05),
+        (1, 4.8, 14.05),
+        (2, 13.6, 5.05),
+        (3, 4.8, 14.05),
+    ):
+        frieze(
+            s,
+            Place(x, PLAZA, z, quarter),
+            -half,
+            half,
+            0.3,
+            reach,
+            1.2,
+            SKULLS,
+            levels=(0.2, ENDLESS),
+        )
     bone = Look(Material.PLASTER, rgb("efe4cc"))
     for row in (-2.4, 0.0, 2.4):
         for k in range(9):
@@ -182,114 +280,23 @@ def _skull_rack(s: Sketch, x: float, z: float) -> None:
             s.box((px - 0.14, 1.7, row - 0.14), (px + 0.14, 6.4, row + 0.14), OLD_WOOD, at=at)
         for bar in range(5):
             y = 2.5 + bar * 0.85
-            s.box((-12.4, y - 0.05, row - 0.05), (12.4, y + 0.05, row + 0.05), OLD_WOOD, at=at,
-                  faces=CLOSED, levels=(0.4, ENDLESS))
+            s.box(
+                (-12.4, y - 0.05, row - 0.05),
+                (12.4, y + 0.05, row + 0.05),
+                OLD_WOOD,
+                at=at,
+                faces=CLOSED,
+                levels=(0.4, ENDLESS),
+            )
             for k in range(24):
                 if k % 3 == 0:
                     continue
                 px = -12.0 + k * 1.0
-                s.box((px - 0.15, y - 0.16, row - 0.17), (px + 0.15, y + 0.16, row + 0.17), bone,
-                      at=at, faces=CLOSED, levels=(0.7 + 0.3 * ((k * 7 + bar) % 5) / 5, ENDLESS))
-
-
-def _hall(s: Sketch, at: Place, w: float, d: float, tall: float, dice: Dice) -> None:
-    """A long hall on a low platform behind a row of pillars; its front is +z."""
-    platform = 1.4
-    s.box((-w - 1, -1.3, -d - 1), (w + 1, platform, d + 1), STONE, at=at, top=PAVING, taper=0.2)
-    for k in range(4):
-        half = 4 - 0.05 * k
-        s.box((-half, -1.2, d), (half, platform * (k + 1) / 5, d + 2.9 - k * 0.5), LIME, at=at,
-              top=PAVING, faces=STANDING & ~NORTH)
-    wall = LIME.tinted(*dice.pick(WALLS[:6]))
-    s.box((-w, platform - 0.1, -d), (w, platform + tall, d - 3.0), wall, at=at, solid=True)
-    s.box((-w, platform + tall * 0.74, d - 3.0), (w, platform + tall, d), wall, at=at, faces=CLOSED)
-    count = max(4, int(2 * w / 3.0))
-    paint = (RED, TURQUOISE, OCHRE)[dice.whole(0, 2)]
-    for k in range(count):
-        x = -w + 0.5 + k * (2 * w - 1.0) / (count - 1)
-        s.box((x - 0.4, platform - 0.1, d - 0.95), (x + 0.4, platform + tall * 0.75, d - 0.15), paint,
-              at=at, levels=(0.12, ENDLESS))
-        s.box((x - 0.55, platform - 0.1, d - 1.1), (x + 0.55, platform + 0.4, d), LIME, at=at,
-              levels=(0.5, ENDLESS))
-        if k < count - 1 and k % 2 == 0:
-            c = x + (2 * w - 1.0) / (count - 1) / 2
-            s.box((c - 0.7, platform, d - 3.3), (c + 0.7, platform + 2.5, d - 2.95), DARK, at=at,
-                  faces=SOUTH, levels=(0.25, ENDLESS))
-    frieze(s, at, -w + 0.2, w - 0.2, platform + tall * 0.78, d + 0.06, tall * 0.2,
-           dice.pick((DISKS, STEPPED_FRET)), levels=(0.15, ENDLESS))
-    s.box((-w - 0.25, platform + tall - 0.04, -d - 0.25), (w + 0.25, platform + tall + 0.4, d + 0.25),
-          LIME.tinted(*dice.pick(BANDS)), at=at, faces=CLOSED, top=ROOF)
-    crest(s, at, w, d, platform + tall + 0.36, 0.7, dice.whole(0, 1))
-
-
-def _quarter_shrine(s: Sketch, layout: Layout, area: Rect, dice: Dice) -> None:
-    """A small square with a pyramid, a hall and a school."""
-    layout.paint(area, Ground.MARKET)
-    x, z = (area.x0 + area.x1) / 2, (area.z0 + area.z1) / 2
-    y = HEIGHTS[Ground.MARKET]
-    half = dice.between(8.5, 11.0)
-    quarter = dice.whole(0, 3)
-    wall = dice.pick((STONE, RED_STONE, STONE.tinted(*rgb("e6c690"))))
-    p = Pyramid(half, half, half * dice.between(0.66, 0.88), dice.whole(2, 4), half * 0.4, 1, wall)
-    back = Place(x, 0.0, z, quarter).point(0.0, 0.0, -6.0)
-    pyramid(s, Place(back[0], y, back[2], quarter), p, dice)
-    layout.cover(Rect(back[0] - half, back[2] - half, back[0] + half, back[2] + half))
-    for side in (-1, 1):
-        spot = Place(x, y, z, quarter).point(side * 17.0, 0.0, 3.0)
-        turn = (quarter + (1 if side < 0 else 3)) % 4
-        _hall(s, Place(spot[0], y, spot[2], turn), 9.0, 3.4, 4.2, dice)
-    for side in (-1, 1):
-        spot = Place(x, y, z, quarter).point(side * 6.0, 0.0, 17.0)
-        banner(s, Place(spot[0], y, spot[2], quarter), 7.0, dice)
-
-
-def _palace(s: Sketch, layout: Layout, area: Rect, dice: Dice) -> None:
-    """Halls around courts, two storeys, on a platform."""
-    y = HEIGHTS[Ground.STREET]
-    base = area.inset(1.5)
-    layout.paint(area, Ground.AVENUE)
-    s.box((base.x0, y - 0.4, base.z0), (base.x1, y + 1.0, base.z1), STONE, top=PAVING, taper=0.15)
-    s.solids.append((*base, y + 1.0))
-    layout.cover(base)
-    nx = max(1, round(base.width / 46))
-    nz = max(1, round(base.depth / 46))
-    cw, cd = base.width / nx, base.depth / nz
-    for i in range(nx):
-        for j in range(nz):
-            cx, cz = base.x0 + (i + 0.5) * cw, base.z0 + (j + 0.5) * cd
-            hw, hd = cw / 2 - 1.2, cd / 2 - 1.2
-            deep = 5.0
-            for quarter in range(4):
-                along = (hw if quarter % 2 == 0 else hd) - (0.3 if quarter % 2 == 0 else 2 * deep + 0.6)
-                reach = (hd if quarter % 2 == 0 else hw) - deep
-                frame = Place(cx, y + 1.0, cz, quarter)
-                inward = frame.point(0.0, 0.0, reach)
-                # halls open to the court
-                hall = Place(inward[0], y + 1.0 + 0.04 * (quarter % 2), inward[2], (quarter + 2) % 4)
-                tall = dice.between(5.0, 6.0) + (2.5 if quarter == 0 else 0.0)
-                _hall(s, hall, along, deep - 0.4, tall, dice)
-                _outer_face(s, hall, along, deep - 0.4, tall, dice)
-    for k in range(4):
-        at = Place(base.x0 + (k + 0.5) * base.width / 4, y + 1.0, base.z1 - 0.9, 0)
-        s.box((-0.3, 0, -0.3), (0.3, 1.2, 0.3), STONE, at=at, levels=(0.6, ENDLESS))
-
-
-def _outer_face(s: Sketch, hall: Place, w: float, d: float, tall: float, dice: Dice) -> None:
-    """Windows, doors and bands on the back of a hall, which looks to the street."""
-    at = Place(hall.x, hall.y + 1.4, hall.z, (hall.quarter + 2) % 4)
-    frieze(s, at, -w + 0.3, w - 0.3, tall * 0.74, d + 0.06, tall * 0.2, DISKS, levels=(0.2, ENDLESS))
-    s.box((-w + 0.02, -0.1, d - 0.1), (w - 0.02, 1.0, d + 0.08), RED.shaded(0.9), at=at,
-          faces=STANDING & ~NORTH, levels=(0.3, ENDLESS))
-    count = max(2, int(2 * w / 3.6))
-    for k in range(count):
-        x = -w + (k + 0.5) * 2 * w / count
-        s.box((x - 0.5, 1.5, d - 0.2), (x + 0.5, 2.9, d + 0.05), DARK, at=at, faces=SOUTH,
-              levels=(0.3, ENDLESS))
-        s.box((x - 0.8, 2.9, d - 0.1), (x + 0.8, 3.2, d + 0.18), OLD_WOOD, at=at,
-              faces=CLOSED & ~NORTH, levels=(dice.between(0.5, 0.8), ENDLESS))
-        for side in (-1, 1):
-            a, b = sorted((x + side * 0.5, x + side * 0.72))
-            s.box((a, 1.4, d - 0.1), (b, 2.9, d + 0.13), TURQUOISE, at=at,
-                  faces=STANDING & ~NORTH, levels=(dice.between(0.7, 1.1), ENDLESS))
-
-
+                s.box(
+                    (px - 0.15, y - 0.16, row - 0.17),
+                    (px + 0.15, y + 0.16, row + 0.17),
+                    bone,
+                    at=at,
+                    faces=CLOSED,
+                    levels=(0.7 + 0.3 * ((k * 7 + bar) % 5) / 5, ENDLESS),
+                )

@@ -1,4 +1,4 @@
-"""From surfaces to triangles: every surface becomes a grid of as many cells as its level asks for."""
+"""From surfaces to triangles: each becomes a grid of as many cells as its level asks for."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ PROFILES = (
     ((1.0, 0.0), (0.7, 0.15), (0.6, 0.5), (0.75, 0.85), (1.0, 1.0)),  # 4: brazier
     ((1.0, 0.0), (0.75, 0.35), (0.62, 1.0)),  # 5: trunk
     ((0.5, 0.0), (1.0, 0.35), (0.8, 0.7), (0.05, 1.0)),  # 6: flame
+    ((0.02, 0.0), (1.0, 1.0)),  # 7: underside of a wide roof
+    ((1.0, 0.0), (0.1, 1.0)),  # 8: lid
 )
 _KNOTS = 13
 

@@ -19,7 +19,7 @@ SIZE = 512
 
 
 def textures() -> dict[Material, Image]:
-    """Every material's texture, (height, width, 4) uint8 sRGB; materials of one colour have none."""
+    """Textures, (height, width, 4) uint8 sRGB; a material of one colour has none."""
     drawn: dict[Material, Callable[[], Floats]] = {
         Material.PLASTER: plaster,
         Material.STONE: stone,
@@ -183,7 +183,7 @@ def stucco() -> Floats:
     """Painted or burnished lime: faint clouds and brush strokes."""
     color = np.ones((SIZE, SIZE, 3)) * (0.88 + 0.12 * cloudy(3, 3, 6, 140))[..., None]
     strokes = noise(64, 6, 150)
-    return color * (0.95 + 0.07 * strokes)[..., None] * np.array((1.0, 0.99, 0.97))
+    return np.asarray(color * (0.95 + 0.07 * strokes)[..., None] * np.array((1.0, 0.99, 0.97)))
 
 
 def water() -> Floats:

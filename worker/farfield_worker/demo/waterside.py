@@ -19,6 +19,7 @@ from farfield_worker.demo.layout import (
 from farfield_worker.demo.looks import (
     CLAY,
     CLOTHS,
+    DARK,
     LIME,
     OLD_WOOD,
     STONE,
@@ -27,7 +28,7 @@ from farfield_worker.demo.looks import (
     Material,
     rgb,
 )
-from farfield_worker.demo.pyramids import banner
+from farfield_worker.demo.shrines import banner
 from farfield_worker.demo.sketch import (
     BOTTOM,
     CLOSED,
@@ -65,31 +66,61 @@ def _bridge(s: Sketch, bridge: Bridge, dice: Dice) -> None:
     at = Place(mx, bridge.height, mz, 1 if along else 0)  # local z runs along the deck
     tone = WOOD.shaded(dice.between(0.8, 1.1))
     top = 0.16
-    s.box((-wide, -0.22, -half - 0.5), (wide, top, half + 0.5), tone, at=at, faces=EAST | WEST | TOP)
-    s.box((-wide, -0.22, -half - 0.5), (wide, top, half + 0.5), tone, at=at,
-          faces=NORTH | SOUTH | BOTTOM, levels=(0.12, ENDLESS))
+    s.box(
+        (-wide, -0.22, -half - 0.5), (wide, top, half + 0.5), tone, at=at, faces=EAST | WEST | TOP
+    )
+    s.box(
+        (-wide, -0.22, -half - 0.5),
+        (wide, top, half + 0.5),
+        tone,
+        at=at,
+        faces=NORTH | SOUTH | BOTTOM,
+        levels=(0.12, ENDLESS),
+    )
     s.solids.append((x0, z0, x1, z1, bridge.height - 0.3))
     for side in (-1, 1):
         a, b = sorted((side * wide, side * (wide - 0.35)))
-        s.box((a, -0.75, -half - 0.3), (b, -0.2, half + 0.3), tone.shaded(0.7), at=at, faces=CLOSED,
-              levels=(0.35, ENDLESS))
+        s.box(
+            (a, -0.75, -half - 0.3),
+            (b, -0.2, half + 0.3),
+            tone.shaded(0.7),
+            at=at,
+            faces=CLOSED,
+            levels=(0.35, ENDLESS),
+        )
         if wide < 1.2 and dice.chance(0.5):
             continue
         posts = max(3, round(half * 2 / 1.8))
         for k in range(posts):
             z = -half - 0.3 + k * (2 * half + 0.6) / (posts - 1)
             c, d = sorted((side * (wide - 0.04), side * (wide - 0.18)))
-            s.box((c, top - 0.05, z - 0.07), (d, top + 0.95, z + 0.07), OLD_WOOD, at=at,
-                  faces=SIDES, levels=(0.14, ENDLESS))
+            s.box(
+                (c, top - 0.05, z - 0.07),
+                (d, top + 0.95, z + 0.07),
+                OLD_WOOD,
+                at=at,
+                faces=SIDES,
+                levels=(0.14, ENDLESS),
+            )
         c, d = sorted((side * (wide - 0.02), side * (wide - 0.2)))
-        s.box((c, top + 0.93, -half - 0.4), (d, top + 1.03, half + 0.4), OLD_WOOD, at=at,
-              faces=CLOSED, levels=(0.18, ENDLESS))
+        s.box(
+            (c, top + 0.93, -half - 0.4),
+            (d, top + 1.03, half + 0.4),
+            OLD_WOOD,
+            at=at,
+            faces=CLOSED,
+            levels=(0.18, ENDLESS),
+        )
     planks = round((2 * half + 1.0) / 0.5)
     for k in range(planks):
         z = -half - 0.5 + (k + 0.5) * (2 * half + 1.0) / planks
-        s.box((-wide - 0.08, top - 0.08, z - 0.2), (wide + 0.08, top + 0.05, z + 0.2),
-              tone.shaded(dice.between(0.8, 1.15))._replace(grain=0.15), at=at,
-              levels=(dice.between(0.6, 1.2), ENDLESS))
+        s.box(
+            (-wide - 0.08, top - 0.08, z - 0.2),
+            (wide + 0.08, top + 0.05, z + 0.2),
+            tone.shaded(dice.between(0.8, 1.15))._replace(grain=0.15),
+            at=at,
+            levels=(dice.between(0.6, 1.2), ENDLESS),
+        )
 
 
 def _canoes(s: Sketch, layout: Layout) -> None:
@@ -140,28 +171,44 @@ def _canoe(
     dx, dz = along[0] / n, along[1] / n
     wide = dice.between(0.45, 0.62)
     tone = HULL.shaded(dice.between(0.7, 1.2))
-    s.hull((x, 0.34, z), (dx * half, dz * half), wide, tone, segments=(11.0, 6.0),
-           levels=(dice.between(0.05, 0.35), ENDLESS))
+    s.hull(
+        (x, 0.34, z),
+        (dx * half, dz * half),
+        wide,
+        tone,
+        segments=(11.0, 6.0),
+        levels=(dice.between(0.05, 0.35), ENDLESS),
+    )
     turn = (dz, dx)
     for k in range(dice.whole(0, 3)):
         t = (k - 1) * 0.3 * half + dice.between(-0.2, 0.2)
         px, pz = x + dx * t, z + dz * t
         r = wide * 0.5
-        s.box((px - r, 0.03, pz - r), (px + r, dice.between(0.55, 0.85), pz + r),
-              dice.pick((CLAY, LIME, WOOD, OLD_WOOD)).shaded(dice.between(0.8, 1.2)), turn=turn,
-              taper=0.06, levels=(dice.between(0.3, 0.7), ENDLESS))
+        s.box(
+            (px - r, 0.03, pz - r),
+            (px + r, dice.between(0.55, 0.85), pz + r),
+            dice.pick((CLAY, LIME, WOOD, OLD_WOOD)).shaded(dice.between(0.8, 1.2)),
+            turn=turn,
+            taper=0.06,
+            levels=(dice.between(0.3, 0.7), ENDLESS),
+        )
     if dice.chance(0.25):
         level = dice.between(0.36, 0.5)
         cloth = Look(Material.CLOTH, dice.pick(CLOTHS), grain=0.6)
-        r, h = wide * 0.95, 1.35
+        r, h = wide * 0.72, 1.35
         p = [
             (x + dx * a * 1.0 - dz * b * r, h, z + dz * a * 1.0 + dx * b * r)
             for a, b in ((-1, 1), (1, 1), (1, -1), (-1, -1))
         ]
         s.quad(p, cloth, sag=(0, 0.0, 0), levels=(level, ENDLESS), uv=(0, 1, 1, 0))
         for px, _, pz in p:
-            s.box((px - 0.04, 0.25, pz - 0.04), (px + 0.04, h + 0.02, pz + 0.04), OLD_WOOD,
-                  faces=SIDES, levels=(level, ENDLESS))
+            s.box(
+                (px - 0.04, 0.25, pz - 0.04),
+                (px + 0.04, h + 0.02, pz + 0.04),
+                OLD_WOOD,
+                faces=SIDES,
+                levels=(level, ENDLESS),
+            )
 
 
 def _market(s: Sketch, area: Rect) -> None:
@@ -188,29 +235,72 @@ def _stall(s: Sketch, at: Place, dice: Dice) -> None:
     low, high = dice.between(1.9, 2.2), dice.between(2.4, 2.8)
     cloth = Look(Material.CLOTH, dice.pick(CLOTHS), grain=0.6)
     level = dice.between(0.02, 0.2)
-    s.quad(((-w, low, d), (w, low, d), (w, high, -d), (-w, high, -d)), cloth, at=at,
-           uv=(0, 1.4, 1, 0), sag=(0, -0.22, 0), levels=(level, ENDLESS))
+    s.quad(
+        ((-w, low, d), (w, low, d), (w, high, -d), (-w, high, -d)),
+        cloth,
+        at=at,
+        uv=(0, 1.4, 1, 0),
+        sag=(0, -0.22, 0),
+        levels=(level, ENDLESS),
+    )
     for x in (-w + 0.06, w - 0.06):
         for z, top in ((d - 0.06, low), (-d + 0.06, high)):
-            s.box((x - 0.05, -0.1, z - 0.05), (x + 0.05, top, z + 0.05), OLD_WOOD, at=at,
-                  faces=SIDES, levels=(level, ENDLESS))
-    s.box((-w + 0.2, -0.05, -d * 0.3), (w - 0.2, 0.7, d * 0.5), WOOD.shaded(dice.between(0.7, 1.0)),
-          at=at, levels=(0.25, ENDLESS))
+            s.box(
+                (x - 0.05, -0.1, z - 0.05),
+                (x + 0.05, top, z + 0.05),
+                OLD_WOOD,
+                at=at,
+                faces=SIDES,
+                levels=(level, ENDLESS),
+            )
+    s.box(
+        (-w + 0.2, -0.05, -d * 0.3),
+        (w - 0.2, 0.7, d * 0.5),
+        WOOD.shaded(dice.between(0.7, 1.0)),
+        at=at,
+        levels=(0.25, ENDLESS),
+    )
     goods = ("d8a23a", "b8452c", "6f8f3c", "e8dcc0", "7a4a2c", "d9743c", "c8b070")
     for k in range(7):
         x = -w + 0.4 + k * (2 * w - 0.8) / 6
         look = Look(Material.PLASTER, rgb(dice.pick(goods)))
         r = dice.between(0.12, 0.2)
         if k % 2:
-            s.lathe((x, 0.68, d * 0.1), r, r * 1.6, 2, look, at=at, sides=6, rings=2,
-                    levels=(dice.between(0.7, 1.4), ENDLESS))
+            s.lathe(
+                (x, 0.68, d * 0.1),
+                r,
+                r * 1.6,
+                2,
+                look,
+                at=at,
+                sides=6,
+                rings=2,
+                levels=(dice.between(0.7, 1.4), ENDLESS),
+                lid=(0.61, 0.985, DARK),
+            )
         else:
-            s.box((x - r, 0.65, d * 0.1 - r), (x + r, 0.7 + r, d * 0.1 + r), look, at=at,
-                  taper=r * 0.3, levels=(dice.between(0.5, 1.1), ENDLESS))
+            s.box(
+                (x - r, 0.65, d * 0.1 - r),
+                (x + r, 0.7 + r, d * 0.1 + r),
+                look,
+                at=at,
+                taper=r * 0.3,
+                levels=(dice.between(0.5, 1.1), ENDLESS),
+            )
     for _ in range(dice.whole(0, 3)):
         x, r = dice.between(-w, w), dice.between(0.2, 0.36)
-        s.lathe((x, -0.04, d + 0.3), r, r * 1.9, 2, CLAY.shaded(dice.between(0.8, 1.3)), at=at,
-                sides=7, rings=3, levels=(dice.between(0.6, 1.4), ENDLESS))
+        s.lathe(
+            (x, -0.04, d + 0.3),
+            r,
+            r * 1.9,
+            2,
+            CLAY.shaded(dice.between(0.8, 1.3)),
+            at=at,
+            sides=7,
+            rings=3,
+            levels=(dice.between(0.6, 1.4), ENDLESS),
+            lid=(0.61, 0.985, DARK),
+        )
 
 
 def _torches(s: Sketch, layout: Layout) -> None:
@@ -233,12 +323,36 @@ def _torches(s: Sketch, layout: Layout) -> None:
                         banner(s, at, 6.5, Dice(141, k, sign, side, int(vertical)))
                         continue
                     s.box((-0.3, -0.1, -0.3), (0.3, 0.5, 0.3), STONE, at=at, levels=(0.16, ENDLESS))
-                    s.box((-0.09, 0.3, -0.09), (0.09, 2.5, 0.09), OLD_WOOD, at=at,
-                          levels=(0.16, ENDLESS))
-                    s.lathe((0, 2.45, 0), 0.3, 0.4, 4, CLAY, at=at, sides=7, rings=2,
-                            levels=(0.2, ENDLESS))
-                    s.lathe((0, 2.75, 0), 0.2, 0.7, 6, fire, at=at, sides=6, rings=3,
-                            levels=(0.22, ENDLESS))
+                    s.box(
+                        (-0.09, 0.3, -0.09),
+                        (0.09, 2.5, 0.09),
+                        OLD_WOOD,
+                        at=at,
+                        levels=(0.16, ENDLESS),
+                    )
+                    s.lathe(
+                        (0, 2.45, 0),
+                        0.3,
+                        0.4,
+                        4,
+                        CLAY,
+                        at=at,
+                        sides=7,
+                        rings=2,
+                        levels=(0.2, ENDLESS),
+                        lid=(0.98, 0.98, DARK),
+                    )
+                    s.lathe(
+                        (0, 2.75, 0),
+                        0.2,
+                        0.7,
+                        6,
+                        fire,
+                        at=at,
+                        sides=6,
+                        rings=3,
+                        levels=(0.22, ENDLESS),
+                    )
 
 
 def _kerbs(s: Sketch, layout: Layout) -> None:
@@ -256,15 +370,35 @@ def _kerbs(s: Sketch, layout: Layout) -> None:
                     near = [at.point(side * 10.5, 0.0, z + e) for e in (-1.6, 0.0, 1.6)]
                     if any(_bridged(layout, p[0], p[2]) for p in near):
                         continue
-                    s.box((side * 9.75 - 0.2, -0.1, z - 0.88), (side * 9.75 + 0.2, 0.34, z + 0.88),
-                          STONE.shaded(dice.between(0.88, 1.08)), at=at, taper=0.03,
-                          levels=(dice.between(0.2, 0.36), ENDLESS))
+                    s.box(
+                        (side * 9.75 - 0.2, -0.1, z - 0.88),
+                        (side * 9.75 + 0.2, 0.34, z + 0.88),
+                        STONE.shaded(dice.between(0.88, 1.08)),
+                        at=at,
+                        taper=0.03,
+                        levels=(dice.between(0.2, 0.36), ENDLESS),
+                    )
                     if k % 6 == 3:
-                        s.lathe((side * 8.6, -0.03, z), 0.55, 0.85, 2, CLAY, at=at, sides=10, rings=4,
-                                levels=(dice.between(0.3, 0.5), ENDLESS))
+                        s.lathe(
+                            (side * 8.6, -0.03, z),
+                            0.55,
+                            0.85,
+                            2,
+                            CLAY,
+                            at=at,
+                            sides=10,
+                            rings=4,
+                            levels=(dice.between(0.3, 0.5), ENDLESS),
+                            lid=(0.61, 0.985, DARK),
+                        )
                     if k % 5 == 1:
-                        s.box((side * 10.5 - 0.09, -2.0, z - 0.09), (side * 10.5 + 0.09, -0.3, z + 0.09),
-                              OLD_WOOD, at=at, levels=(dice.between(0.35, 0.7), ENDLESS))
+                        s.box(
+                            (side * 10.5 - 0.09, -2.0, z - 0.09),
+                            (side * 10.5 + 0.09, -0.3, z + 0.09),
+                            OLD_WOOD,
+                            at=at,
+                            levels=(dice.between(0.35, 0.7), ENDLESS),
+                        )
 
 
 def _paved(layout: Layout, x: float, z: float) -> bool:
