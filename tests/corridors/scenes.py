@@ -58,7 +58,7 @@ SCENES = {
         Scene("hotel_room", "hotel_room/hotel_room.glb", 250, (8985, 1540, -6387)),
         # an eighth of a metre: along the arena's upper floor
         Scene("pandora", "pandora_indoor/pandora.obj", 16, (276, 270, -7)),
-        # along the wall of the temple district
-        Scene("city", None, 14, (-112, 3, -92)),
+        # down the avenue to the great temple
+        Scene("city", None, 14, (0, 8, 308)),
     )
 }

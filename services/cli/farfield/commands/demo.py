@@ -7,6 +7,7 @@ import json
 import os
 import tempfile
 import time
+from importlib.resources import files
 from pathlib import Path
 
 import click
@@ -15,11 +16,11 @@ from farfield_api.service import FarfieldService
 from farfield_api.settings import ApiSettings
 from farfield_core import scenes
 from farfield_core.bake import read_walk
-from farfield_core.corridor import Corridor, read_corridor
+from farfield_core.corridor import Corridor, parse_corridor, read_corridor
 from farfield_core.errors import BakeFailedError, NotFoundError
 from farfield_core.settings import BakeSettings
 from farfield_core.store import Store
-from farfield_core.suggest import suggest_corridor
+from farfield_core.suggest import Suggestion, suggest_corridor
 from farfield_worker import demo
 
 from farfield.options import jobs_option, port_options, settings_options, store_option
@@ -68,21 +69,27 @@ def command(
     try:
         with server.beside(create_app(api, service)):
             with warming_up():
-                identity = _scene(service.store, scene, detail)
-            bake = _begin(service, identity, wanted, settings)
+                if scene is None:
+                    identity = _city(service.store, detail)
+                else:
+                    identity = prepared_scene(service.store, scene).id
+            chosen = _avenue() if scene is None else None
+            bake = _begin(service, identity, wanted, chosen, settings)
             _watch(service, bake, f"{server.address}/walk/{bake}")
     except KeyboardInterrupt:
         click.echo("Stopped; run the same command again to go on.", err=True)
 
 
 def _begin(
-    service: FarfieldService, identity: str, corridor: Corridor | None, settings: BakeSettings
+    service: FarfieldService,
+    identity: str,
+    corridor: Corridor | None,
+    chosen: Suggestion | None,
+    settings: BakeSettings,
 ) -> str:
-    """Choose a corridor if need be and have its bake begun; returns the bake's id."""
+    """Have a bake begun, along `chosen` or a corridor found in the scene unless one is given."""
     if corridor is None:
-        with working("Choosing a corridor"), tempfile.TemporaryDirectory() as folder:
-            scene = scenes.open_prepared(service.store, identity, Path(folder))
-            chosen = suggest_corridor(scene)
+        chosen = chosen or _suggested(service.store, identity)
         corridor = chosen.corridor
         if "cell_size" not in settings.model_fields_set:
             edge = chosen.cell_size
@@ -98,10 +105,20 @@ def _begin(
     return bake
 
 
-def _scene(store: Store, scene: str | None, detail: int) -> str:
-    """A prepared scene's id: the one asked for, or the demo city, built once for each store."""
-    if scene is not None:
-        return prepared_scene(store, scene).id
+def _suggested(store: Store, scene: str) -> Suggestion:
+    """A corridor found in a prepared scene."""
+    with working("Choosing a corridor"), tempfile.TemporaryDirectory() as folder:
+        return suggest_corridor(scenes.open_prepared(store, scene, Path(folder)))
+
+
+def _avenue() -> Suggestion:
+    """The demo city's own walk, down the avenue to the great temple."""
+    text = files(demo).joinpath("corridors/avenue.json").read_bytes()
+    return Suggestion(parse_corridor(text), cell_size=14.0)
+
+
+def _city(store: Store, detail: int) -> str:
+    """Id of the demo city, which is built once for each store."""
     key = f"demo/city-{detail}-{_city_version()}.json"
     try:
         city = str(json.loads(store.get(key))["scene"])
