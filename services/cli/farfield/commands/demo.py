@@ -61,6 +61,9 @@ def command(
 
     SCENE is a model file or the id of a scene in the store; without it the demo city is baked.
     """
+    if scene is None and corridor is None:
+        corridor = demo.AVENUE
+        settings = _with_cells(settings, demo.CELL_SIZE)
     wanted = None if corridor is None else read_corridor(corridor)
     api = ApiSettings.from_environment(os.environ, store=store, jobs=jobs)
     server = Server(host, port)
@@ -84,11 +87,7 @@ def _begin(
             scene = scenes.open_prepared(service.store, identity, Path(folder))
             chosen = suggest_corridor(scene)
         corridor = chosen.corridor
-        if "cell_size" not in settings.model_fields_set:
-            edge = chosen.cell_size
-            settings = BakeSettings(
-                **settings.model_dump(exclude={"cell_size"}), cell_size=(edge, edge, edge)
-            )
+        settings = _with_cells(settings, chosen.cell_size)
     bake = service.create_bake(identity, corridor, settings)
     walk = read_walk(service.store, bake)
     # before whatever else this store still has to bake
@@ -96,6 +95,13 @@ def _begin(
         table = walk.grid.cells
         service.bakes.focus(bake, (table.i[0], table.j[0], table.k[0]))
     return bake
+
+
+def _with_cells(settings: BakeSettings, edge: float) -> BakeSettings:
+    """Settings with cubic cells of this edge, unless they say how large cells are."""
+    if "cell_size" in settings.model_fields_set:
+        return settings
+    return BakeSettings(**settings.model_dump(exclude={"cell_size"}), cell_size=(edge, edge, edge))
 
 
 def _scene(store: Store, scene: str | None, detail: int) -> str:
