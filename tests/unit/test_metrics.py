@@ -10,6 +10,7 @@ from farfield_worker.verify.metrics import (
     compare,
     eroded,
     flip_map,
+    mean_flip,
     unmatched,
 )
 from hypothesis import given
@@ -80,6 +81,17 @@ def test_flip_sees_a_difference_where_it_is() -> None:
     error = flip_map(a, b)
     assert error[20:30, 40:50].mean() > 0.3
     assert error[:, :16].max() < 1e-3
+
+
+def test_mean_flip_is_the_mean_of_the_map() -> None:
+    """The rectangle it looks at leaves out nothing that matters."""
+    rng = np.random.default_rng(11)
+    a, b = (rng.integers(0, 256, (96, 128, 3), np.uint8) for _ in range(2))
+    for y, x, h, w in ((40, 50, 7, 9), (0, 0, 1, 1), (90, 3, 6, 80), (0, 0, 96, 128)):
+        mask = np.zeros((96, 128), bool)
+        mask[y : y + h, x : x + w] = rng.random((h, w)) < 0.9
+        mask[y, x] = True
+        assert mean_flip(a, b, mask) == pytest.approx(flip_map(a, b)[mask].mean(), abs=1e-6)
 
 
 def test_combine_is_the_figure_of_the_joined_picture() -> None:

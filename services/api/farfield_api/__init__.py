@@ -1,1 +1,3 @@
 """Farfield over HTTP."""
+
+__version__ = "0.1.0"

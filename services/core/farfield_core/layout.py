@@ -43,3 +43,18 @@ def atlas_key(name: str) -> str:
 def near_key(name: str) -> str:
     """A near block or a texture of one, `name` being its hash and suffix."""
     return f"blobs/near/{name}"
+
+
+def scene_key(scene: str) -> str:
+    """What says that a scene is ready; written last."""
+    return f"scenes/{scene}/prepared/scene.json"
+
+
+def refused_key(scene: str) -> str:
+    """Why a scene could not be prepared."""
+    return f"scenes/{scene}/refused.json"
+
+
+def scene_prefix(scene: str) -> str:
+    """Folder of everything that belongs to a scene."""
+    return f"scenes/{scene}/"

@@ -18,23 +18,43 @@ class BakeSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    quads: Literal["layers"] = "layers"
-    #: edge lengths of a view cell, metres; one number means a cube
-    cell_size: tuple[Positive, Positive, Positive] = (10.0, 10.0, 10.0)
-    layers: int = Field(default=64, ge=1, le=4096)
-    #: wanted half width of the near field, metres; chooses the number of layers
-    near: Positive | None = None
-    #: parallax bound, radians; null means the central pixel of a 60 degree image
-    alpha: Annotated[float, Field(gt=0, lt=0.7853)] | None = None
-    #: how many texels two neighbouring layers may shift by; null means no bound
-    gap_texels: Positive | None = 1.0
-    resolution: int = Field(default=512, ge=16, le=4096)
-    faces: Literal["auto", "sides", "all"] = "auto"
-    grower: Literal["greedy", "best"] = "best"
-    visibility: Literal["on", "off"] = "on"
-    encoder: Literal["png", "webp"] = "png"
-    supersample: int = Field(default=1, ge=1, le=4)
-    renderer: Literal["moderngl", "pyrender"] = "moderngl"
+    quads: Literal["layers"] = Field(default="layers", description="kind of impostor quads")
+    cell_size: tuple[Positive, Positive, Positive] = Field(
+        default=(10.0, 10.0, 10.0),
+        description="edge lengths of a view cell, metres; one number means a cube",
+    )
+    layers: int = Field(default=64, ge=1, le=4096, description="number of layers")
+    near: Positive | None = Field(
+        default=None,
+        description="wanted half width of the near field, metres; chooses the number of layers",
+    )
+    alpha: Annotated[float, Field(gt=0, lt=0.7853)] | None = Field(
+        default=None,
+        description="parallax bound, radians; by default the central pixel of a 60 degree image "
+        "of as many pixels as a face has texels",
+    )
+    gap_texels: Positive | None = Field(
+        default=1.0,
+        description="how many texels two neighbouring layers may shift by; none means no bound",
+    )
+    resolution: int = Field(default=512, ge=16, le=4096, description="texels across a face")
+    faces: Literal["auto", "sides", "all"] = Field(
+        default="auto",
+        description="which faces are baked; auto: those through which far geometry shows",
+    )
+    grower: Literal["greedy", "best"] = Field(
+        default="best", description="how texels are gathered into quads"
+    )
+    visibility: Literal["on", "off"] = Field(
+        default="on", description="leave out what no eye in the cell can see"
+    )
+    encoder: Literal["png", "webp"] = Field(default="png", description="format of atlas pages")
+    supersample: int = Field(
+        default=1, ge=1, le=4, description="samples per texel and axis while rendering"
+    )
+    renderer: Literal["moderngl", "pyrender"] = Field(
+        default="moderngl", description="what draws the layers"
+    )
 
     @field_validator("cell_size", mode="before")
     @classmethod

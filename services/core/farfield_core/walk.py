@@ -1,37 +1,53 @@
 """The walk format: walk.json and cell files as Python objects (docs/format.md).
 
-The JSON Schemas in `format/` are the source; these models are tested against them.
+The JSON Schemas in `format/` are the source; these models are tested against them. Read as JSON, a
+document has to be complete; in Python the members that always say the same may be left out.
 """
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, model_validator
 
 from farfield_core.scene import Bounds, Triple
 
 VERSION: Literal[1] = 1
 
 
+Count = Annotated[int, Field(ge=0)]
+Positive = Annotated[float, Field(gt=0)]
+Extent = tuple[Positive, Positive, Positive]
+Text = Annotated[str, Field(min_length=1)]
+Folder = Annotated[str, Field(pattern="/$")]
+
+
 class _Model(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @model_validator(mode="after")
+    def _complete(self, info: ValidationInfo) -> Self:
+        if info.mode == "json":
+            for name in type(self).model_fields:
+                if name not in self.model_fields_set:
+                    raise ValueError(f"{name} is missing")
+        return self
 
 
 class WalkScene(_Model):
     """What a walk says of its scene."""
 
-    id: str
+    id: Text
     name: str
-    triangles: int
+    triangles: Count
     bounds: Bounds
 
 
 class CellPage(_Model):
     """A slice of a large corridor's cells, kept in a file of its own."""
 
-    href: str
-    cells: int
+    href: Text
+    cells: Annotated[int, Field(ge=1)]
     bounds: Bounds
 
 
@@ -48,26 +64,32 @@ class WalkGrid(_Model):
     """The lattice of view cells: inline for small corridors, paged for large ones."""
 
     origin: Triple
-    size: Triple
-    total: int
+    size: Extent
+    total: Annotated[int, Field(ge=1)]
     cells: CellTable | None = None
     pages: tuple[CellPage, ...] = ()
+
+    @model_validator(mode="after")
+    def _inline_or_paged(self) -> WalkGrid:
+        if (self.cells is None) == (not self.pages):
+            raise ValueError("a grid has either its cells or pages of them")
+        return self
 
 
 class AtlasFormat(_Model):
     """All atlas pages of a walk are of this size."""
 
-    width: int
-    height: int
+    width: Annotated[int, Field(ge=1)]
+    height: Annotated[int, Field(ge=1)]
     encoding: Literal["png", "webp"]
 
 
 class Places(_Model):
     """Where things lie, relative to walk.json; each ends in a slash."""
 
-    cells: str = "cells/"
-    atlases: str = "../../blobs/atlases/"
-    near: str = "../../blobs/near/"
+    cells: Folder = "cells/"
+    atlases: Folder = "../../blobs/atlases/"
+    near: Folder = "../../blobs/near/"
 
 
 class Start(_Model):
@@ -83,17 +105,17 @@ class Walk(_Model):
 
     format: Literal["farfield-walk"] = "farfield-walk"
     version: Literal[1] = VERSION
-    id: str
+    id: Text
     name: str
     scene: WalkScene
     settings: dict[str, Any]
-    resolution: int
-    layers: tuple[float, ...]
-    borders: tuple[float, ...]
-    near_field: float
+    resolution: Annotated[int, Field(ge=2)]
+    layers: tuple[Positive, ...]
+    borders: tuple[Positive, ...]
+    near_field: Positive
     grid: WalkGrid
     atlas: AtlasFormat
-    light: dict[str, tuple[float, float, float]]
+    light: dict[str, Triple]
     places: Places = Places()
     start: Start
 
@@ -107,16 +129,16 @@ class Quads(_Model):
     scale * (x, y) + offset, x and y swapped first if it is turned.
     """
 
-    eyes: tuple[int, ...]
-    faces: tuple[int, ...]
-    layers: tuple[int, ...]
-    corner_counts: tuple[int, ...]
+    eyes: tuple[Count, ...]
+    faces: tuple[Annotated[int, Field(ge=0, le=5)], ...]
+    layers: tuple[Annotated[int, Field(ge=-1)], ...]
+    corner_counts: tuple[Annotated[int, Field(ge=3, le=8)], ...]
     corners: tuple[float, ...]
     planes: tuple[float, ...]
-    pages: tuple[int, ...]
-    scales: tuple[float, ...]
+    pages: tuple[Count, ...]
+    scales: tuple[Positive, ...]
     offsets: tuple[float, ...]
-    turned: tuple[int, ...]
+    turned: tuple[Annotated[int, Field(ge=0, le=1)], ...]
 
 
 class NearBlock(_Model):
@@ -125,8 +147,8 @@ class NearBlock(_Model):
     `ranges` holds (primitive, first triangle, triangles) triples, flat.
     """
 
-    blob: str
-    ranges: tuple[int, ...]
+    blob: Annotated[str, Field(pattern=r"^[0-9a-f]{32}\.glb$")]
+    ranges: tuple[Count, ...]
 
 
 class CellFile(_Model):
@@ -135,8 +157,8 @@ class CellFile(_Model):
     format: Literal["farfield-cell"] = "farfield-cell"
     version: Literal[1] = VERSION
     cell: tuple[int, int, int]
-    eyes: tuple[Triple, ...]
+    eyes: Annotated[tuple[Triple, ...], Field(min_length=1)]
     quads: Quads
-    atlases: tuple[str, ...]
+    atlases: tuple[Annotated[str, Field(pattern=r"^[0-9a-f]{32}\.(png|webp)$")], ...]
     near: tuple[NearBlock, ...]
     figures: dict[str, float]

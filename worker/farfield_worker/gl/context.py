@@ -1,9 +1,9 @@
 """The process's one OpenGL context, and the few calls that moderngl does not wrap.
 
 Depth is reversed everywhere: clip space runs over [0, 1] (glClipControl), a point at distance Z
-along the camera's axis gets depth near / Z in a 32-bit float buffer that is cleared to 0 and tested
-with >=. That is an infinite far plane with the float's full relative precision at any distance, so
-surfaces centimetres apart do not flicker even kilometres away.
+along the camera's axis gets depth near / Z in a 32-bit float buffer that is cleared to 0. That is
+an infinite far plane with the float's full relative precision at any distance, so surfaces
+centimetres apart do not flicker even kilometres away. Of equal depths the first drawn stays.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def shared() -> moderngl.Context:
     context = moderngl.create_context(**options)
     with context:
         _call("glClipControl", _GL_LOWER_LEFT, _GL_ZERO_TO_ONE)
-        context.depth_func = ">="
+        context.depth_func = ">"
     return context
 
 
@@ -73,6 +73,14 @@ def release_framebuffer(framebuffer: moderngl.Framebuffer) -> None:
     for attachment in attachments:
         if attachment is not None:
             attachment.release()
+
+
+def cull_back_faces(context: moderngl.Context, cull: bool) -> None:
+    """Draw both sides of triangles, or only their fronts."""
+    if cull:
+        context.enable(moderngl.CULL_FACE)
+    else:
+        context.disable(moderngl.CULL_FACE)
 
 
 def device_name(context: moderngl.Context) -> str:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-import io
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
+
+from farfield_worker.prepare.images import encode_png, shrink
 
 #: longest side of a texture that a browser is sent
 LARGEST = 2048
@@ -15,12 +17,8 @@ LARGEST = 2048
 def near_texture(path: Path) -> tuple[str, bytes]:
     """Name (hash and suffix) and bytes of the texture at `path` for near blocks."""
     with Image.open(path) as image:
-        longest = max(image.size)
-        if longest <= LARGEST:
+        if max(image.size) <= LARGEST:
             data = path.read_bytes()
         else:
-            width, height = (max(1, round(side * LARGEST / longest)) for side in image.size)
-            out = io.BytesIO()
-            image.resize((width, height), Image.Resampling.BOX).save(out, "PNG", compress_level=6)
-            data = out.getvalue()
+            data = encode_png(shrink(np.asarray(image), LARGEST))
     return hashlib.sha256(data).hexdigest()[:32] + ".png", data

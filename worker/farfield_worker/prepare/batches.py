@@ -11,18 +11,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
 from farfield_core.scene import Batch, Texture
-from numpy.typing import NDArray
-from PIL import Image
 
-from farfield_worker.prepare.images import UnreadablePictureError, encode_png
+from farfield_worker.prepare.images import UnreadablePictureError, encode_png, shrink
 from farfield_worker.prepare.model import Material, Mesh, Model, TextureUse
 
-#: longest side of a stored texture; larger ones are halved
+#: longest side of a stored texture; larger ones are reduced
 LARGEST_TEXTURE = 8192
-#: opacity counts as even (glass) if the least is at least this share of the greatest
-EVEN = 0.75
+#: opacity counts as even (glass) if the least is at least this share of the greatest: a mask at
+#: half the greatest would cut nothing
+EVEN = 0.5
 
 _OPAQUE = 254.5 / 255
 
@@ -85,7 +83,7 @@ class TextureFiles:
             self.notes.append(f"The texture {use.picture.name!r} cannot be read.")
             return None
         if not keep_alpha:
-            pixels = np.ascontiguousarray(pixels[..., :3])
+            pixels = pixels[..., :3].copy()
         pixels = shrink(pixels, LARGEST_TEXTURE)
         use.picture.forget()
         data = encode_png(pixels)
@@ -94,17 +92,6 @@ class TextureFiles:
         if not path.exists():
             path.write_bytes(data)
         return name, pixels.shape[1], pixels.shape[0]
-
-
-def shrink(pixels: NDArray[np.uint8], longest: int) -> NDArray[np.uint8]:
-    """Pixels (h, w, c) averaged down until no side exceeds `longest`; colours weigh by opacity."""
-    height, width = pixels.shape[:2]
-    scale = longest / max(height, width)
-    if scale >= 1:
-        return pixels
-    image = Image.fromarray(pixels)
-    size = (max(1, round(width * scale)), max(1, round(height * scale)))
-    return np.asarray(image.resize(size, Image.Resampling.BOX))
 
 
 def sort_into_batches(model: Model, files: TextureFiles) -> tuple[list[Batch], list[Look]]:
@@ -139,6 +126,8 @@ def _look(
 ) -> Look:
     _, has_uvs, low, high = key
     base = material.base if has_uvs else None
+    if material.base is not None and not has_uvs:
+        _note(model, "A part without texture coordinates lost its texture.")
     if base is not None:
         least, greatest = files.opacity(base)
         low, high = low * least, high * greatest
@@ -191,8 +180,11 @@ def _emission(
     index = files.add(use, keep_alpha=False) if has_uvs and fits else None
     if index is None:
         # the factor alone would make the whole surface shine
-        note = "An emissive texture could not be used; that surface does not shine."
-        if note not in model.notes:
-            model.notes.append(note)
+        _note(model, "An emissive texture could not be used; that surface does not shine.")
         return (0.0, 0.0, 0.0), None
     return material.emissive, index
+
+
+def _note(model: Model, text: str) -> None:
+    if text not in model.notes:
+        model.notes.append(text)

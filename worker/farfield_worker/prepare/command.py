@@ -38,6 +38,10 @@ def main(argv: list[str]) -> int:
     except FarfieldError as error:
         print(json.dumps({"ok": False, "error": str(error)}))
         return error.exit_code
+    except OSError as error:
+        why = f"{args.out} cannot be written: {error.strerror or error}."
+        print(json.dumps({"ok": False, "error": why}))
+        return 1
     print(json.dumps({"ok": True, "triangles": info.triangles, "notes": list(info.notes)}))
     return 0
 

@@ -98,3 +98,22 @@ def encode_png(pixels: NDArray[np.uint8]) -> bytes:
     out = io.BytesIO()
     Image.fromarray(pixels).save(out, "PNG", compress_level=4)
     return out.getvalue()
+
+
+def shrink(pixels: NDArray[np.uint8], longest: int) -> NDArray[np.uint8]:
+    """Pixels (h, w, 3|4) averaged down until no side exceeds `longest`.
+
+    Colours weigh by opacity; where all is transparent they are averaged as they are, so that
+    sampling between texels finds no black.
+    """
+    height, width = pixels.shape[:2]
+    scale = longest / max(height, width)
+    if scale >= 1:
+        return pixels
+    size = (max(1, round(width * scale)), max(1, round(height * scale)))
+    small = np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX))
+    if pixels.shape[2] == 3:
+        return small
+    plain = Image.fromarray(pixels[..., :3].copy()).resize(size, Image.Resampling.BOX)
+    color = np.where(small[..., 3:] > 0, small[..., :3], np.asarray(plain))
+    return np.concatenate([color, small[..., 3:]], axis=-1)

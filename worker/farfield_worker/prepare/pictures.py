@@ -76,12 +76,16 @@ def _quantile(
 def _picture(painter: Painter, camera: Camera, size: tuple[int, int], sky: bool) -> Image.Image:
     width, height = size
     big = painter.draw(camera, width * _SUPERSAMPLE, height * _SUPERSAMPLE, sky)
-    blocks = big.reshape(height, _SUPERSAMPLE, width, _SUPERSAMPLE, 4).astype(np.float64) / 255
-    alpha = blocks[..., 3:]
-    light = (to_linear(blocks[..., :3]) * alpha).mean(axis=(1, 3))
-    cover = alpha.mean(axis=(1, 3))
-    color = to_srgb(light / np.where(cover > 0, cover, 1))
-    return Image.fromarray(np.rint(np.concatenate([color, cover], -1) * 255).astype(np.uint8))
+    out = np.empty((height, width, 4), np.uint8)
+    for row in range(height):
+        strip = big[row * _SUPERSAMPLE : (row + 1) * _SUPERSAMPLE] / 255
+        pixels = strip.reshape(_SUPERSAMPLE, width, _SUPERSAMPLE, 4)
+        alpha = pixels[..., 3:]
+        light = (to_linear(pixels[..., :3]) * alpha).mean(axis=(0, 2))
+        cover = alpha.mean(axis=(0, 2))
+        color = to_srgb(light / np.where(cover > 0, cover, 1))
+        out[row] = np.rint(np.concatenate([color, cover], -1) * 255)
+    return Image.fromarray(out)
 
 
 def _pair(point: NDArray[np.float64]) -> tuple[float, float]:

@@ -37,10 +37,12 @@ def prepare(
     name: str,
     limits: Limits | None = None,
     progress: Progress = lambda line: None,
+    pictures: bool = True,
 ) -> SceneInfo:
     """Prepare the model at `source` into the folder `out`, replacing what is there.
 
-    Nothing is visible under `out` before everything is. Raises SceneRefusedError for files that
+    Nothing is visible under `out` before everything is. With `pictures` it draws the map and the
+    thumbnail, which creates a GL context in this process. Raises SceneRefusedError for files that
     cannot be read, whatever is wrong with them.
     """
     limits = limits or Limits()
@@ -48,7 +50,7 @@ def prepare(
     work = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
     try:
         work.chmod(0o755)
-        info = _prepare(source, work, scene_id, name, limits, progress)
+        info = _prepare(source, work, scene_id, name, limits, progress, pictures)
         if out.exists():
             shutil.rmtree(out)
         work.rename(out)
@@ -60,8 +62,30 @@ def prepare(
 
 
 def _prepare(
+    source: Path,
+    work: Path,
+    scene_id: str,
+    name: str,
+    limits: Limits,
+    progress: Progress,
+    pictures: bool,
+) -> SceneInfo:
+    info = _convert(source, work, scene_id, name, limits, progress)
+    if pictures:
+        progress("drawing the map")
+        view = draw_pictures(map_scene(work, info), work)
+        notes = info.notes
+        if view is None:
+            notes += ("There is no map and no thumbnail: this machine offers no OpenGL.",)
+        info = info.model_copy(update={"map": view, "notes": notes})
+    (work / "scene.json").write_text(info.model_dump_json(), encoding="utf-8")
+    return info
+
+
+def _convert(
     source: Path, work: Path, scene_id: str, name: str, limits: Limits, progress: Progress
 ) -> SceneInfo:
+    """Write everything but the pictures and scene.json."""
     progress("reading")
     model = read_model(source, limits)
     if not np.isfinite(model.matrices).all():
@@ -85,8 +109,7 @@ def _prepare(
     order, starts = split(points)
     progress(f"writing {len(starts) - 1} blocks")
     blocks, vertices = _write(work, assembly, origin, batches, points, order, starts)
-
-    info = SceneInfo(
+    return SceneInfo(
         id=scene_id,
         name=name,
         bounds=Bounds(min=_triple(low), max=_triple(high)),
@@ -98,14 +121,6 @@ def _prepare(
         blocks=tuple(blocks),
         notes=tuple(model.notes),
     )
-    progress("drawing the map")
-    view = draw_pictures(map_scene(work, info), work)
-    if view is None:
-        note = "There is no map and no thumbnail: this machine offers no OpenGL."
-        info = info.model_copy(update={"notes": (*info.notes, note)})
-    info = info.model_copy(update={"map": view})
-    (work / "scene.json").write_text(info.model_dump_json(), encoding="utf-8")
-    return info
 
 
 def _write(
@@ -136,8 +151,6 @@ def _write(
         for name, file in files.items():
             file.append(getattr(welded, name))
         vertices += len(welded.positions)
-        if vertices > np.iinfo(np.uint32).max:
-            refuse("The model", "it has too many vertices")
     for file in files.values():
         file.close()
     return blocks, vertices

@@ -28,7 +28,13 @@ def read_ply(folder: ModelFolder, limits: Limits) -> Model:
     with folder.model.open("rb") as file:
         header = check_header(folder, file)
         file.seek(0)
-        loaded = load_ply(file, skip_materials=True)
+        try:
+            loaded = load_ply(file, skip_materials=True)
+        except ValueError as error:
+            if "unexpected length" not in str(error):
+                raise
+            cause = "it is cut off, or its faces have different numbers of corners: triangulate it"
+            refuse(folder.name, cause)
     if loaded.get("vertices") is None or loaded.get("faces") is None:
         refuse(folder.name, "it holds no triangles")
     positions = np.asarray(loaded["vertices"], np.float64)

@@ -54,10 +54,13 @@ def read_model(source: Path, limits: Limits) -> Model:
             # NumPy reports numbers that are none as a deprecation
             warnings.simplefilter("error", DeprecationWarning)
             warnings.simplefilter("ignore", RuntimeWarning)
-            return reader(ModelFolder(source), limits)
+            model = reader(ModelFolder(source), limits)
     except MemoryError:
         refuse(source.name, "it needs more memory than there is")
     except _DAMAGE as error:
         logging.getLogger(__name__).debug("reading %s", source, exc_info=True)
         cause = " ".join(str(error).split())[:120] or type(error).__name__
         refuse(source.name, f"it is damaged or not what its suffix says ({cause})")
+    if not any(len(mesh.triangles) for mesh in model.meshes):
+        refuse(source.name, "it holds no triangles")
+    return model

@@ -63,11 +63,10 @@ class Accessors:
             self.document.refuse("an accessor has an unknown type")
         return dtype, width
 
-    def floats(self, index: Any, rows: NDArray[Any] | None = None) -> NDArray[np.float32]:
-        """(count, components) float32, normalised integers scaled; only `rows` if given."""
-        raw = self.raw(index)
+    def floats(self, index: Any) -> NDArray[np.float32]:
+        """(count, components) float32, normalised integers scaled."""
         normalized = bool(self.document.item("accessors", index).get("normalized", False))
-        return to_float(raw if rows is None else raw[rows], normalized)
+        return to_float(self.raw(index), normalized)
 
     def _strided(
         self, entry: Json, view: Any, count: int, dtype: np.dtype[Any], width: int
@@ -107,5 +106,5 @@ def to_float(array: NDArray[Any], normalized: bool) -> NDArray[np.float32]:
     if normalized and array.dtype.kind in "iu":
         out = out / np.float32(np.iinfo(array.dtype).max)
         if array.dtype.kind == "i":
-            np.maximum(out, -1, out)
+            np.maximum(out, -1, out=out)
     return out

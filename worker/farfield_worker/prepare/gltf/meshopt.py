@@ -9,8 +9,8 @@ import numpy as np
 
 from farfield_worker.prepare.gltf.document import Bytes, Document, Json, size_of
 
-#: The densest stream of each codec: a vertex group of 16 needs at least 2 bits for each byte of an
-#: element, an index triangle at least one byte.
+#: The densest stream: blocks of at most 256 elements whose bytes never change cost one control byte
+#: for every four bytes of an element.
 _MOST_PER_BYTE = 1024
 
 _FILTERS = {

@@ -42,15 +42,15 @@ class Primitives:
             triangles = _unroll(corners, mode)
         if len(triangles) == 0:
             return None
-        rows, compact = np.unique(triangles, return_inverse=True)
-        if int(rows[-1]) >= source.count:
+        if int(triangles.max()) >= source.count:
             self.document.refuse("a primitive's indices point beyond its vertices")
+        rows, compact = used_vertices(triangles, source.count)
         number = primitive.get("material", len(self.materials) - 1)
         if not isinstance(number, int) or not 0 <= number < len(self.materials):
             self.document.refuse(f"it refers to material {number!r}, which it does not have")
         return Mesh(
             source.floats("POSITION", rows, 3),
-            compact.reshape(-1, 3).astype(np.uint32),
+            compact,
             number,
             source.floats("NORMAL", rows, 3) if source.has("NORMAL") else None,
             self._uvs(source, rows, self.materials[number]),
@@ -58,14 +58,13 @@ class Primitives:
         )
 
     def _uvs(
-        self, source: _Source, rows: NDArray[Any], material: Material
+        self, source: _Source, rows: NDArray[Any] | slice, material: Material
     ) -> NDArray[np.float32] | None:
         use = material.base or material.emissive_texture
         if use is None:
             return None
         name = f"TEXCOORD_{use.texcoord}"
         if not source.has(name):
-            self.document.note("A textured primitive without texture coordinates lost its texture.")
             return None
         uvs = source.floats(name, rows, 2)
         if use.transform is not None:
@@ -100,7 +99,7 @@ class _Source:
         data = None if self.draco is None else self.draco.column(name)
         return self.accessors.raw(self.attributes[name]) if data is None else data
 
-    def floats(self, name: str, rows: NDArray[Any], width: int) -> NDArray[np.float32]:
+    def floats(self, name: str, rows: NDArray[Any] | slice, width: int) -> NDArray[np.float32]:
         raw = self.raw(name)
         document = self.accessors.document
         if raw.shape[1] != width or len(raw) < self.count:
@@ -108,7 +107,7 @@ class _Source:
         entry = document.item("accessors", self.attributes[name])
         return to_float(raw[rows], bool(entry.get("normalized", False)))
 
-    def colors(self, rows: NDArray[Any]) -> NDArray[np.uint16] | None:
+    def colors(self, rows: NDArray[Any] | slice) -> NDArray[np.uint16] | None:
         """COLOR_0, linear times 65535; floats out of [0, 1] are clamped."""
         if not self.has("COLOR_0"):
             return None
@@ -116,9 +115,25 @@ class _Source:
         if raw.shape[1] not in (3, 4) or len(raw) < self.count:
             self.accessors.document.refuse("a primitive's COLOR_0 does not fit its positions")
         value = to_float(raw[rows], True)
-        out = np.full((len(rows), 4), 65535, np.uint16)
+        out = np.full((len(value), 4), 65535, np.uint16)
         out[:, : raw.shape[1]] = np.rint(np.clip(np.nan_to_num(value, nan=1), 0, 1) * 65535)
         return out
+
+
+def used_vertices(
+    triangles: NDArray[Any], count: int
+) -> tuple[NDArray[Any] | slice, NDArray[np.uint32]]:
+    """Rows of the vertices that (m, 3) `triangles` use, of `count`, and triangles of those rows."""
+    if count > 8 * triangles.size:
+        # a small piece of a large shared buffer: the work must follow the piece
+        rows, compact = np.unique(triangles, return_inverse=True)
+        return rows, compact.reshape(-1, 3).astype(np.uint32)
+    used = np.zeros(count, np.bool_)
+    used[triangles.reshape(-1)] = True
+    if used.all():
+        return slice(None), np.ascontiguousarray(triangles, np.uint32)
+    place = np.cumsum(used, dtype=np.uint32) - np.uint32(1)
+    return np.flatnonzero(used), place[triangles]
 
 
 def _unroll(corners: NDArray[Any], mode: int) -> NDArray[Any]:

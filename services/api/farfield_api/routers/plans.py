@@ -1,0 +1,20 @@
+"""POST /plans: what a bake would come to."""
+
+from __future__ import annotations
+
+from farfield_core.plan import Plan, plan
+from fastapi import APIRouter
+
+from farfield_api.dependencies import Service
+from farfield_api.exceptions import problems
+from farfield_api.schemas import BakeRequest
+
+router = APIRouter(tags=["plans"])
+
+
+@router.post("/plans", responses=problems(404, 409, 422))
+def make_plan(service: Service, request: BakeRequest) -> Plan:
+    """Estimate cells, near field, megabytes and seconds; nothing is rendered or kept."""
+    scene = service.ready_scene(request.scene)
+    corridor = service.corridor(request.scene, request.corridor)
+    return plan(scene, corridor, request.settings)

@@ -1,0 +1,134 @@
+"""Bodies of requests and answers, with examples for OpenAPI."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from farfield_core.corridor import Corridor
+from farfield_core.scene import Bounds
+from farfield_core.settings import BakeSettings
+from pydantic import BaseModel, ConfigDict, Field
+
+SCENE = "3f1c9a52d07be846"
+CORRIDOR = "9b0f6c1de2a34875"
+BAKE = "c4d07e9a1b5f3286"
+
+BOX: dict[str, Any] = {"box": {"min": [-20.0, 0.0, -5.0], "max": [20.0, 4.0, 5.0]}}
+PATH: dict[str, Any] = {
+    "path": {"points": [[0.0, 0.0, 0.0], [40.0, 0.0, 0.0]], "width": 4.0, "height": 3.0}
+}
+ASKED: dict[str, Any] = {
+    "scene": SCENE,
+    "corridor": PATH,
+    "settings": {"cell_size": 10, "layers": 64, "resolution": 512},
+}
+
+
+class SceneBody(BaseModel):
+    """A scene, and how far it has come."""
+
+    id: str = Field(examples=[SCENE])
+    name: str = Field(examples=["town"])
+    state: Literal["preparing", "ready", "refused"]
+    #: why it was refused
+    reason: str | None = None
+    bounds: Bounds | None = None
+    triangles: int | None = Field(default=None, examples=[2_015_444])
+    textures: int | None = Field(default=None, examples=[12])
+    #: what was left out or guessed while reading
+    notes: tuple[str, ...] = ()
+
+
+class SceneList(BaseModel):
+    """All scenes."""
+
+    scenes: list[SceneBody]
+
+
+class NewScene(BaseModel):
+    """A scene that has arrived."""
+
+    id: str = Field(examples=[SCENE])
+    state: Literal["preparing", "ready", "refused"]
+
+
+class NewCorridor(BaseModel):
+    """A corridor that was kept."""
+
+    id: str = Field(examples=[CORRIDOR])
+    #: view cells of the default size along it
+    cells: int = Field(examples=[42])
+
+
+class BakeRequest(BaseModel):
+    """What to bake, or to plan."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [ASKED]})
+
+    scene: str = Field(pattern=r"^[a-z0-9-]{1,64}$")
+    #: a corridor file's content, or the id of one sent before
+    corridor: Corridor | str
+    settings: BakeSettings = BakeSettings()
+
+
+class NewBake(BaseModel):
+    """A bake that was asked for."""
+
+    id: str = Field(examples=[BAKE])
+
+
+class CellCounts(BaseModel):
+    """How many cells there are, exist, and cannot be baked."""
+
+    total: int = Field(examples=[42])
+    done: int = Field(examples=[17])
+    failed: int = Field(examples=[0])
+
+
+class FailedCell(BaseModel):
+    """A cell that cannot be baked, and why."""
+
+    cell: str = Field(examples=["0_0_3"])
+    reason: str
+
+
+State = Literal["queued", "running", "paused", "cancelled", "done", "failed"]
+
+
+class BakeBody(BaseModel):
+    """A bake, and how far it has come."""
+
+    id: str = Field(examples=[BAKE])
+    name: str = Field(examples=["town"])
+    scene: str = Field(examples=[SCENE])
+    state: State
+    #: why the bake as a whole cannot go on
+    reason: str | None = None
+    cells: CellCounts
+    #: cells baked a second, over the last minute; null where none was
+    rate: float | None = Field(default=None, examples=[1.7])
+    #: seconds until all cells exist at that rate
+    seconds_left: float | None = Field(default=None, examples=[14.7])
+    failures: list[FailedCell] = []
+
+
+class BakeList(BaseModel):
+    """All bakes."""
+
+    bakes: list[BakeBody]
+
+
+class Focus(BaseModel):
+    """Where a walker stands."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    cell: tuple[int, int, int] = Field(examples=[[0, 0, 3]])
+
+
+class CellNames(BaseModel):
+    """A page of the cells that exist."""
+
+    cells: list[str] = Field(examples=[["0_0_0", "0_0_1"]])
+    #: the `page` to ask for next; null on the last page
+    next: str | None = Field(examples=["1000"])

@@ -1,0 +1,92 @@
+"""Progress on standard error: a bar on a terminal, plain lines elsewhere."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.text import Text
+
+#: seconds between lines where there is no terminal
+LINE_EVERY = 5.0
+
+
+def console() -> Console:
+    """Where progress goes."""
+    return Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+@contextmanager
+def working(what: str) -> Iterator[None]:
+    """Say what is being done for as long as it takes."""
+    screen = console()
+    if screen.is_terminal:
+        with screen.status(what + " …"):
+            yield
+    else:
+        screen.print(what + " …")
+        yield
+
+
+class _CellsPerSecond(ProgressColumn):
+    def render(self, task: Task) -> Text:
+        """How fast cells come."""
+        return Text(f"{task.speed:.2f} cells/s" if task.speed else "- cells/s")
+
+
+class CellProgress:
+    """Cells done, cells per second and the time left."""
+
+    def __init__(self, total: int, done: int, what: str = "baking") -> None:
+        self._console = console()
+        self._total = total
+        self._first = self._done = done
+        self._began = self._said = time.monotonic()
+        self._bar = Progress(
+            TextColumn(what),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("cells"),
+            _CellsPerSecond(),
+            TimeRemainingColumn(),
+            TextColumn("left"),
+            console=self._console,
+            disable=not self._console.is_terminal,
+        )
+        self._task = self._bar.add_task(what, total=total, completed=done)
+
+    def __enter__(self) -> CellProgress:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def one_more(self) -> None:
+        """A cell is done."""
+        self._done += 1
+        self._bar.advance(self._task)
+        now = time.monotonic()
+        last = self._done == self._total
+        if not self._console.is_terminal and (last or now - self._said > LINE_EVERY):
+            self._said = now
+            rate = (self._done - self._first) / max(now - self._began, 1e-9)
+            left = (self._total - self._done) / rate
+            self._console.print(
+                f"{self._done}/{self._total} cells, {rate:.2f} cells/s, {left:.0f} s left"
+            )
+
+    def say(self, text: str) -> None:
+        """A line above the bar."""
+        self._bar.console.print(text)

@@ -1,0 +1,167 @@
+"""Preparing a scene in a process of its own.
+
+The child `python -m farfield_worker prepare --source FILE --out DIR --id ID --name NAME` prints
+`{"ok": true, ...}` or `{"ok": false, "error": "..."}` as its last line on standard output.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import IO
+
+from farfield_core import layout, scenes
+from farfield_core.errors import FarfieldError, NotFoundError, SceneRefusedError
+from farfield_core.scene import SceneInfo
+from farfield_core.store import Store
+
+COMMAND: tuple[str, ...] = (sys.executable, "-m", "farfield_worker", "prepare")
+
+
+def prepare_scene(
+    store: Store,
+    scene: str,
+    command: Sequence[str] = COMMAND,
+    stopped: Callable[[], bool] = lambda: False,
+) -> SceneInfo:
+    """Prepare an uploaded scene unless it is ready already.
+
+    `stopped` is asked a few times a second and ends the work. Raises NotFoundError, and
+    SceneRefusedError with the reason, which the store then remembers.
+    """
+    try:
+        return scenes.scene_info(store, scene)
+    except NotFoundError:
+        name = scenes.scene_state(store, scene).name
+    # beside where it belongs, so that a store in a folder only renames it
+    home = store.local_path(layout.scene_prefix(scene))
+    with tempfile.TemporaryDirectory(prefix=".preparing-", dir=home) as work:
+        model = scenes.source_model(store, scene, Path(work) / "copy")
+        out = Path(work) / "prepared"
+        arguments = ["--source", model, "--out", out, "--id", scene, "--name", name]
+        try:
+            _run([*command, *map(str, arguments)], stopped)
+        except SceneRefusedError as error:
+            scenes.refuse(store, scene, str(error))
+            raise
+        scenes.publish(store, scene, out)
+    return scenes.scene_info(store, scene)
+
+
+def _run(command: list[str], stopped: Callable[[], bool]) -> None:
+    """Run the child to its end; raises SceneRefusedError with what it says or died of."""
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as words:
+        try:
+            child = subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, stdout=out, stderr=words, start_new_session=True
+            )
+        except OSError as error:
+            raise FarfieldError(f"Preparing a scene could not begin: {error}.") from None
+        try:
+            while True:
+                try:
+                    code = child.wait(timeout=0.2)
+                    break
+                except subprocess.TimeoutExpired:
+                    if stopped():
+                        raise FarfieldError("Preparing the scene was stopped.") from None
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(child.pid, signal.SIGKILL)
+            child.wait()
+        answer, last_words = _last_line(out), _last_line(words)
+    try:
+        said = json.loads(answer)
+        good, reason = said.get("ok") is True, str(said.get("error", "no reason was given"))
+    except (ValueError, AttributeError):
+        ending = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
+        good, reason = (
+            False,
+            f"The process that prepared the scene {ending}: {last_words or 'no word'}",
+        )
+    if not good:
+        raise SceneRefusedError(reason)
+
+
+def _last_line(file: IO[bytes]) -> str:
+    file.seek(0)
+    return file.read().decode("utf-8", "replace").strip().rsplit("\n", 1)[-1]
+
+
+class ScenePreparer:
+    """Prepares scenes one after the other in the background; safe to call from any thread."""
+
+    def __init__(self, store: Store, command: Sequence[str] = COMMAND) -> None:
+        self._store = store
+        self._command = tuple(command)
+        self._waiting: list[str] = []
+        self._changed = threading.Condition()
+        self._closed = False
+        self._errors: dict[str, str] = {}
+        self._thread = threading.Thread(target=self._serve, name="farfield-preparer", daemon=True)
+        self._thread.start()
+
+    def submit(self, scene: str) -> None:
+        """Prepare an uploaded scene; nothing happens if it waits already."""
+        with self._changed:
+            self._errors.pop(scene, None)
+            if scene not in self._waiting:
+                self._waiting.append(scene)
+            self._changed.notify_all()
+
+    def preparing(self, scene: str) -> bool:
+        """Whether a scene is being prepared or waits for it."""
+        with self._changed:
+            return scene in self._waiting
+
+    def error(self, scene: str) -> str | None:
+        """Why preparing a scene failed though the scene was not refused, such as a full disk."""
+        with self._changed:
+            return self._errors.get(scene)
+
+    def wait(self, scene: str, timeout: float | None = None) -> bool:
+        """Wait until a scene is no longer being prepared; False after `timeout` seconds."""
+        with self._changed:
+            return self._changed.wait_for(lambda: scene not in self._waiting, timeout)
+
+    def close(self) -> None:
+        """Stop at once."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+        self._thread.join()
+
+    def _serve(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._waiting or self._closed)
+                if self._closed:
+                    return
+                scene = self._waiting[0]
+            try:
+                prepare_scene(self._store, scene, self._command, lambda: self._closed)
+            except SceneRefusedError:
+                pass  # the store remembers why
+            except (FarfieldError, OSError) as error:
+                with self._changed:
+                    self._errors[scene] = str(error)
+            with self._changed:
+                self._waiting.remove(scene)
+                self._changed.notify_all()
+
+
+def forget_scene(store: Store, scene: str) -> None:
+    """Remove everything of a scene."""
+    store.delete_prefix(layout.scene_prefix(scene))
+    folder = store.local_path(layout.scene_prefix(scene))
+    if folder is not None:
+        shutil.rmtree(folder, ignore_errors=True)

@@ -1,0 +1,31 @@
+"""Documents from outside into models, every complaint in one sentence."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from farfield_core.errors import BadInputError
+
+M = TypeVar("M", bound=BaseModel)
+
+
+def explain(error: ValidationError, what: str) -> str:
+    """One sentence about the first thing wrong with `what`."""
+    first = error.errors(include_url=False)[0]
+    place = ".".join(str(part) for part in first["loc"])
+    message = first["msg"].removeprefix("Value error, ").rstrip(".")
+    more = error.error_count() - 1
+    rest = f" (and {more} more)" if more else ""
+    return f"{what}: {place}: {message}{rest}." if place else f"{what}: {message}{rest}."
+
+
+def parse(model: type[M], data: bytes | str | dict[str, Any], what: str) -> M:
+    """Read `data`, JSON text or its content, as `model`; raises BadInputError naming `what`."""
+    try:
+        if isinstance(data, dict):
+            return model.model_validate(data)
+        return model.model_validate_json(data)
+    except ValidationError as error:
+        raise BadInputError(explain(error, what)) from None

@@ -1,0 +1,150 @@
+"""The main job, end to end: real models baked by the command line, served, walked in Chromium.
+
+At each cell's centre the browser's picture must equal `farfield shoot` of the walk's files, and it
+is compared with a full render of the scene. Sizes are small unless FARFIELD_SOAK=1.
+"""
+
+import json
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from farfield.server import Server
+from farfield_api.app import create_app
+from farfield_api.settings import ApiSettings
+from farfield_core.cells import cell_name
+from farfield_core.layout import prepared_prefix
+from farfield_core.scene import open_scene
+from farfield_core.walk import CellFile, Walk
+from farfield_worker.shoot.scene import SceneShooter
+from farfield_worker.shoot.view import NearField, Picture, View
+from farfield_worker.shoot.walk import WalkShooter
+from farfield_worker.verify.metrics import Shot, compare, eroded, unmatched
+from PIL import Image
+
+from tests.browser.conftest import Visit
+from tests.corridors.scenes import DATA, SCENES, Scene
+
+SOAK = os.environ.get("FARFIELD_SOAK") == "1"
+RESOLUTION, LAYERS, CELLS = (512, 64, 4) if SOAK else (256, 24, 2)
+SIZE = 512 if SOAK else 256
+RESULTS = Path(__file__).parents[2] / "bench" / "results"
+
+pytestmark = pytest.mark.data
+needs_data = pytest.mark.skipif(
+    not DATA.is_dir(), reason=f"the real scenes are not there: no folder {DATA}"
+)
+
+
+def bake(scene: Scene, model: Path, folder: Path) -> Path:
+    """Bake the beginning of the scene's corridor; returns the folder of its walk.json."""
+    corridor = json.loads(scene.corridor.read_text(encoding="utf-8"))
+    (x, y, z), *_ = corridor["path"]["points"]
+    edge = scene.cell_size
+    corridor["path"]["points"] = [[x, y, z], [x + (CELLS - 1.2) * edge, y, z]]
+    corridor["path"]["width"] = 0.01 * edge
+    file = folder / "corridor.json"
+    file.write_text(json.dumps(corridor), encoding="utf-8")
+    result = subprocess.run(
+        [
+            *(sys.executable, "-m", "farfield", "bake", str(model), "--corridor", str(file)),
+            *("--out", str(folder / "out"), "--cell-size", str(edge), "--json"),
+            *("--resolution", str(RESOLUTION), "--layers", str(LAYERS)),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=1800,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    (walk,) = (folder / "out" / "bakes").glob("*/walk.json")
+    return walk.parent
+
+
+@contextmanager
+def served(store: Path, web: Path) -> Iterator[str]:
+    """Serve a store as `farfield serve` does; yields the server's address."""
+    server = Server("127.0.0.1", 0)
+    settings = ApiSettings.from_environment({"FARFIELD_WEB": str(web)}, store=str(store), jobs=1)
+    with server.beside(create_app(settings)):
+        yield server.address
+
+
+def shot(picture: Picture) -> Shot:
+    return Shot(picture.rgba[..., :3], picture.rgba[..., 3] > 0, picture.far)
+
+
+def look_over(scene: Scene, model: Path, folder: Path, visit: Visit, web: Path) -> None:
+    """Bake, serve, stand in every cell, and hold the browser's picture against both others."""
+    bake_folder = bake(scene, model, folder)
+    walk = Walk.model_validate_json((bake_folder / "walk.json").read_text(encoding="utf-8"))
+    cells = [
+        CellFile.model_validate_json(path.read_text(encoding="utf-8"))
+        for path in sorted((bake_folder / "cells").glob("*.json"))
+    ]
+    assert len(cells) == walk.grid.total >= 2
+    prepared = open_scene(folder / "out" / prepared_prefix(walk.scene.id))
+    walks, scenes = WalkShooter(bake_folder), SceneShooter(prepared)
+    clip = 0.01 * min(walk.grid.size)
+    report = {}
+    with served(folder / "out", web) as address:
+        visit.page.set_viewport_size({"width": SIZE, "height": SIZE})
+        visit.open(f"{address}/walk/{walk.id}?capture")
+        for cell in cells:
+            x, y, z = cell.eyes[0]
+            for turn in range(4 if SOAK else 2):
+                yaw, pitch = walk.start.yaw + turn * math.pi / 2, 0.05
+                visit.go_to(x, y, z, yaw, pitch)
+                seen = visit.pixels()
+                view = View((x, y, z), yaw, pitch, 60.0, SIZE, clip)
+                drawn = walks.shoot(view, cell.cell)
+                full = shot(scenes.shoot(view, NearField((x, y, z), walk.near_field)))
+                name = f"{cell_name(cell.cell)} yaw {yaw:.2f}"
+                wrong = max(
+                    unmatched(seen[..., :3], drawn.rgba[..., :3]).mean(),
+                    unmatched(drawn.rgba[..., :3], seen[..., :3]).mean(),
+                )
+                missing = eroded(drawn.rgba[..., 3] > 0) & (seen[..., 3] == 0)
+                against = compare(full, Shot(seen[..., :3], seen[..., 3] > 0, drawn.far))
+                report[name] = {
+                    "browser": {"wrong": float(wrong), "missing": int(missing.sum())},
+                    "full render": None if against is None else against._asdict(),
+                }
+                sheet = np.concatenate([seen[..., :3], drawn.rgba[..., :3], full.rgb], axis=1)
+                Image.fromarray(sheet).save(folder / f"{name.replace(' ', '_')}.png")
+    walks.close()
+    scenes.close()
+    if SOAK:
+        RESULTS.mkdir(parents=True, exist_ok=True)
+        text = json.dumps(report, indent=1)
+        (RESULTS / f"real_scenes_{scene.name}.json").write_text(text + "\n", encoding="utf-8")
+    for name, figures in report.items():
+        assert figures["browser"]["wrong"] <= 1e-3, (name, figures)
+        assert figures["browser"]["missing"] == 0, (name, figures)
+    shown = [f["full render"] for f in report.values() if f["full render"] is not None]
+    pixels = sum(f["pixels"] for f in shown)
+    # A walk of the wrong cell, or one that lacks a face, misses far more than this.
+    assert sum(f["missing"] * f["pixels"] for f in shown) <= 0.02 * pixels, report
+    assert sum(f["extra"] * f["pixels"] for f in shown) <= 0.05 * pixels, report
+
+
+@needs_data
+@pytest.mark.parametrize("scene", [s for s in SCENES.values() if s.source], ids=lambda s: s.name)
+def test_a_real_model_is_baked_and_walked(
+    scene: Scene, tmp_path: Path, visit: Visit, pages: Path
+) -> None:
+    look_over(scene, scene.model, tmp_path, visit, pages)
+
+
+def test_the_demo_city_is_baked_and_walked(tmp_path: Path, visit: Visit, pages: Path) -> None:
+    from farfield_worker.demo.city import write_city
+
+    model = tmp_path / "city.glb"
+    write_city(model, triangles=850_000 if SOAK else 100_000)
+    look_over(SCENES["city"], model, tmp_path, visit, pages)

@@ -1,0 +1,77 @@
+"""Plans agree with bakes, and are fast."""
+
+import time
+
+import pytest
+from farfield_core.bake import create_bake
+from farfield_core.corridor import parse_corridor
+from farfield_core.errors import BadInputError
+from farfield_core.plan import plan
+from farfield_core.settings import BakeSettings
+from farfield_core.store import Store
+
+from tests.unit.walks import scene_info
+
+CORRIDORS = {
+    "box": {"box": {"min": [0, 0, 0], "max": [95, 25, 41]}},
+    "ground box": {"box": {"min": [0, 0, 0], "max": [95, 25, 41]}, "follow_ground": True},
+    "path": {"path": {"points": [[0, 0, 0], [70, 0, 30]], "width": 4, "height": 3}},
+}
+
+
+@pytest.mark.parametrize("name", ["box", "path"])
+def test_a_plan_says_what_the_bake_has(name: str) -> None:
+    settings = BakeSettings(resolution=64, layers=7)
+    corridor = parse_corridor(CORRIDORS[name])
+    planned = plan(scene_info(), corridor, settings)
+    walk = create_bake(Store.open("memory://"), scene_info(), corridor, settings)
+    assert planned.cells == walk.grid.total
+    assert planned.near_field == walk.near_field
+    assert planned.layers == len(walk.layers) == 7
+
+
+def test_following_the_ground_takes_one_cell_a_column() -> None:
+    planned = plan(scene_info(), parse_corridor(CORRIDORS["ground box"]), BakeSettings())
+    assert planned.cells == 10 * 5
+
+
+def test_near_chooses_the_layers() -> None:
+    corridor = parse_corridor(CORRIDORS["box"])
+    planned = plan(scene_info(), corridor, BakeSettings(near=30, resolution=512))
+    assert planned.near_field <= 30
+    fewer = BakeSettings(layers=planned.layers - 1)
+    assert plan(scene_info(), corridor, fewer).near_field > 30
+
+
+def test_estimates_grow_with_what_they_depend_on() -> None:
+    corridor = parse_corridor(CORRIDORS["box"])
+    small = plan(scene_info(), corridor, BakeSettings(resolution=256, layers=16))
+    for more in (
+        BakeSettings(resolution=512, layers=16),
+        BakeSettings(resolution=256, layers=64),
+    ):
+        large = plan(scene_info(), corridor, more)
+        assert large.seconds > small.seconds > 0
+        assert large.megabytes > small.megabytes > 0
+        assert large.quads > small.quads > 0
+
+
+def test_plans_follow_a_drag() -> None:
+    huge = parse_corridor({"box": {"min": [0, 0, 0], "max": [10_000, 10, 10_000]}})
+    long = parse_corridor(
+        {"path": {"points": [[0, 0, 0], [5000, 0, 900]], "width": 20, "height": 3}}
+    )
+    for corridor in (huge, long):
+        plan(scene_info(), corridor, BakeSettings())
+        times = []
+        for _ in range(5):
+            began = time.perf_counter()
+            plan(scene_info(), corridor, BakeSettings())
+            times.append(time.perf_counter() - began)
+        assert min(times) < 0.05
+
+
+def test_what_cannot_be_baked_cannot_be_planned() -> None:
+    corridor = parse_corridor({"box": {"min": [0, 0, 0], "max": [1e6, 1e6, 1e6]}})
+    with pytest.raises(BadInputError):
+        plan(scene_info(), corridor, BakeSettings())

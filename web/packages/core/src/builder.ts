@@ -1,0 +1,151 @@
+/** Turns downloaded bytes into buffers to draw, here or in a worker. */
+
+import { FarfieldError, asError, AbortedError } from './errors.js';
+import type { CellFile, NearReference, Vec3 } from './format.js';
+import { WALK_VERSION } from './format.js';
+import { buildNearBatches, type NearBatch, type NearSource } from './near.js';
+import { buildQuadVertices, type QuadVertices } from './quads.js';
+
+/** What a cell file says, ready to upload. */
+export interface BuiltCell {
+  readonly centre: Vec3;
+  readonly far: QuadVertices;
+  readonly atlases: readonly string[];
+  readonly near: readonly NearReference[];
+}
+
+export interface CellBuilder {
+  /** Build a cell from its file's bytes, which may be taken away from the caller. */
+  cell(bytes: ArrayBuffer, resolution: number): Promise<BuiltCell>;
+  near(sources: readonly NearSource[], centre: Vec3): Promise<NearBatch[]>;
+  dispose(): void;
+}
+
+/** Read a cell file; throws FarfieldError 'format'. */
+export function buildCell(bytes: ArrayBuffer, resolution: number): BuiltCell {
+  let cell: CellFile;
+  try {
+    cell = JSON.parse(new TextDecoder().decode(bytes)) as CellFile;
+  } catch {
+    throw new FarfieldError('format', 'A cell file is not JSON.');
+  }
+  const { format, version } = cell as { format: unknown; version: unknown };
+  if (format !== 'farfield-cell' || version !== WALK_VERSION) {
+    throw new FarfieldError('format', 'A cell file is not of the version this viewer reads.');
+  }
+  return {
+    centre: cell.eyes[0],
+    far: buildQuadVertices(cell, resolution),
+    atlases: cell.atlases,
+    near: cell.near,
+  };
+}
+
+/** Builds on the calling thread. */
+export class InlineBuilder implements CellBuilder {
+  async cell(bytes: ArrayBuffer, resolution: number): Promise<BuiltCell> {
+    return Promise.resolve(buildCell(bytes, resolution));
+  }
+
+  async near(sources: readonly NearSource[], centre: Vec3): Promise<NearBatch[]> {
+    return Promise.resolve(buildNearBatches(sources, centre));
+  }
+
+  dispose(): void {
+    return;
+  }
+}
+
+export type BuildRequest =
+  | { id: number; kind: 'cell'; bytes: ArrayBuffer; resolution: number }
+  | { id: number; kind: 'near'; sources: readonly NearSource[]; centre: Vec3 };
+
+export type BuildReply =
+  { id: number; value: BuiltCell | NearBatch[] } | { id: number; error: string };
+
+interface Waiting {
+  readonly resolve: (value: never) => void;
+  readonly reject: (error: Error) => void;
+}
+
+/** Builds in a worker. */
+export class WorkerBuilder implements CellBuilder {
+  private readonly worker: Worker;
+  private readonly waiting = new Map<number, Waiting>();
+  private next = 0;
+
+  constructor(worker: Worker) {
+    this.worker = worker;
+    worker.onmessage = ({ data }: MessageEvent<BuildReply>) => {
+      const waiter = this.waiting.get(data.id);
+      this.waiting.delete(data.id);
+      if ('error' in data) waiter?.reject(new FarfieldError('format', data.error));
+      else waiter?.resolve(data.value as never);
+    };
+    worker.onerror = (event) => {
+      event.preventDefault();
+      this.fail(new FarfieldError('unsupported', `The worker stopped: ${event.message}.`));
+    };
+  }
+
+  cell(bytes: ArrayBuffer, resolution: number): Promise<BuiltCell> {
+    return this.ask({ id: this.next++, kind: 'cell', bytes, resolution }, [bytes]);
+  }
+
+  near(sources: readonly NearSource[], centre: Vec3): Promise<NearBatch[]> {
+    return this.ask({ id: this.next++, kind: 'near', sources, centre }, []);
+  }
+
+  dispose(): void {
+    this.worker.terminate();
+    this.fail(new AbortedError());
+  }
+
+  private ask<T extends BuiltCell | NearBatch[]>(
+    request: BuildRequest,
+    transfer: Transferable[],
+  ): Promise<T> {
+    return new Promise<T>((resolve, reject) => {
+      this.waiting.set(request.id, { resolve, reject });
+      this.worker.postMessage(request, transfer);
+    });
+  }
+
+  private fail(error: Error): void {
+    for (const waiter of this.waiting.values()) waiter.reject(error);
+    this.waiting.clear();
+  }
+}
+
+/** Answer one request; the buffers in the reply can be transferred. */
+export function answer(request: BuildRequest): { reply: BuildReply; transfer: ArrayBuffer[] } {
+  try {
+    if (request.kind === 'cell') {
+      const value = buildCell(request.bytes, request.resolution);
+      const { positions, texels, indices } = value.far;
+      return {
+        reply: { id: request.id, value },
+        transfer: [positions.buffer, texels.buffer, indices.buffer],
+      };
+    }
+    const value = buildNearBatches(request.sources, request.centre);
+    const transfer = value.flatMap(({ positions, normals, uvs, colors, indices }) => [
+      positions.buffer,
+      normals.buffer,
+      uvs.buffer,
+      colors.buffer,
+      indices.buffer,
+    ]);
+    return { reply: { id: request.id, value }, transfer };
+  } catch (error) {
+    return { reply: { id: request.id, error: asError(error).message }, transfer: [] };
+  }
+}
+
+/** A builder in a worker where there are workers, otherwise on this thread. */
+export function createBuilder(): CellBuilder {
+  if (typeof Worker === 'undefined') return new InlineBuilder();
+  return new WorkerBuilder(
+    new Worker(new URL('./builder-worker.js', import.meta.url), { type: 'module' }),
+  );
+}

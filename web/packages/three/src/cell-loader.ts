@@ -1,0 +1,187 @@
+/** Brings one cell from its file to a complete view: pages, near blocks, textures, buffers. */
+
+import {
+  FarfieldError,
+  SharedStore,
+  type BuiltCell,
+  type CellBuilder,
+  type FetchQueue,
+  type Job,
+  type Loaded,
+  type Manifest,
+  type NearBatch,
+  type NearState,
+  type NearTexture,
+  type User,
+} from '@farfield/core';
+import type { RawShaderMaterial, Texture } from 'three';
+import type { AttributeUpload } from './attribute-upload.js';
+import { CellView } from './cell-view.js';
+import type { NearMaterials } from './near-materials.js';
+import type { NearTextures } from './near-textures.js';
+import type { PagePool } from './page-pool.js';
+
+/** Bytes of downloaded near blocks that are kept for the next cell. */
+const BLOCK_BYTES = 48 * 2 ** 20;
+
+export interface CellLoaderParts {
+  readonly manifest: Manifest;
+  readonly queue: FetchQueue;
+  readonly builder: CellBuilder;
+  readonly pages: PagePool;
+  readonly textures: NearTextures;
+  readonly materials: NearMaterials;
+  readonly farMaterial: RawShaderMaterial;
+  readonly attributes: AttributeUpload;
+  /** Make the view's shader programs ready. */
+  readonly compile: (view: CellView) => Promise<void>;
+}
+
+export class CellLoader {
+  private readonly parts: CellLoaderParts;
+  private readonly blocks: SharedStore<ArrayBuffer>;
+
+  constructor(parts: CellLoaderParts) {
+    this.parts = parts;
+    const { manifest, queue } = parts;
+    this.blocks = new SharedStore({
+      capacity: BLOCK_BYTES,
+      load: async (name, { priority, signal, reserve }) => {
+        const bytes = await queue.get(manifest.nearUrl(name), priority, signal);
+        // More than fits is used all the same, but not kept.
+        if (bytes.byteLength < BLOCK_BYTES / 4) reserve(bytes.byteLength);
+        return bytes;
+      },
+    });
+  }
+
+  /** Load a cell; what it holds is released by disposing of the view, or here on failure. */
+  async load(job: Job): Promise<Loaded<CellView>> {
+    const { manifest, queue, builder } = this.parts;
+    const bytes = await queue.get(manifest.cellUrl(job.cell.name), job.priority, job.signal);
+    const cell = await builder.cell(bytes, manifest.walk.resolution);
+    job.signal.throwIfAborted();
+    const held: (() => void)[] = [];
+    const release = (): void => held.splice(0).forEach((free) => free());
+    // At once, not when the load notices: another cell may be waiting for this memory.
+    job.signal.addEventListener('abort', release, { once: true });
+    try {
+      const view = await this.build(cell, job, held, release);
+      return { view, bytes: view.bytes };
+    } catch (error) {
+      release();
+      // Only the cell's own file may be missing: then it is not baked yet.
+      if (error instanceof FarfieldError && error.code === 'not-found') {
+        throw new FarfieldError('network', `A part of the cell is missing. ${error.message}`);
+      }
+      throw error;
+    } finally {
+      job.signal.removeEventListener('abort', release);
+    }
+  }
+
+  dispose(): void {
+    this.blocks.clear();
+  }
+
+  private async build(
+    cell: BuiltCell,
+    job: Job,
+    held: (() => void)[],
+    release: () => void,
+  ): Promise<CellView> {
+    const { pages, materials, farMaterial, attributes, compile } = this.parts;
+    const user: User = { priority: job.priority };
+    const allSlots = settleAll(
+      cell.atlases.map((name) => {
+        held.push(() => pages.release(name, user));
+        return abortable(pages.acquire(name, user), job.signal);
+      }),
+    );
+    const allNear = this.near(cell, job, user, held);
+    await Promise.allSettled([allSlots, allNear]);
+    const slots = await allSlots;
+    const { batches, textures } = await allNear;
+    const view = new CellView(
+      cell,
+      slots,
+      farMaterial,
+      batches,
+      batches.map(({ state }) =>
+        materials.get(
+          state,
+          state.map === undefined ? undefined : textures.get(state.map),
+          state.emissiveMap === undefined ? undefined : textures.get(state.emissiveMap),
+        ),
+      ),
+      release,
+    );
+    try {
+      await compile(view);
+      await attributes.add(view.geometries, user, job.signal);
+      job.signal.throwIfAborted();
+    } catch (error) {
+      view.dispose();
+      throw error;
+    }
+    return view;
+  }
+
+  private async near(
+    cell: BuiltCell,
+    job: Job,
+    user: User,
+    held: (() => void)[],
+  ): Promise<{ batches: NearBatch[]; textures: Map<NearTexture, Texture> }> {
+    const { builder } = this.parts;
+    const sources = await settleAll(
+      cell.near.map(async ({ blob, ranges }) => {
+        held.push(() => this.blocks.release(blob, user));
+        return { bytes: await abortable(this.blocks.acquire(blob, user), job.signal), ranges };
+      }),
+    );
+    const built = sources.length === 0 ? [] : await builder.near(sources, cell.centre);
+    for (const { blob } of cell.near) this.blocks.release(blob, user);
+    job.signal.throwIfAborted();
+    const batches = built.map((batch) => ({ ...batch, state: this.absolute(batch.state) }));
+    const wanted = batches
+      .flatMap(({ state }) => [state.map, state.emissiveMap])
+      .filter((texture) => texture !== undefined);
+    const textures = await settleAll(
+      wanted.map(async (texture) => {
+        held.push(() => this.parts.textures.release(texture, user));
+        const loaded = await abortable(this.parts.textures.acquire(texture, user), job.signal);
+        return [texture, loaded] as const;
+      }),
+    );
+    return { batches, textures: new Map(textures) };
+  }
+
+  /** The state with its textures' addresses made absolute, so that blocks share them. */
+  private absolute(state: NearState): NearState {
+    const resolve = (texture: NearTexture | undefined): NearTexture | undefined =>
+      texture && { ...texture, uri: this.parts.manifest.nearUrl(texture.uri) };
+    return { ...state, map: resolve(state.map), emissiveMap: resolve(state.emissiveMap) };
+  }
+}
+
+/** Promise.all that waits until all have settled, so nothing is acquired after a release. */
+async function settleAll<T>(promises: readonly Promise<T>[]): Promise<T[]> {
+  const results = await Promise.allSettled(promises);
+  return results.map((result) => {
+    if (result.status === 'rejected') throw result.reason;
+    return result.value;
+  });
+}
+
+/** A shared promise, left early when this user calls off. */
+function abortable<T>(promise: Promise<T>, signal: AbortSignal): Promise<T> {
+  return new Promise((resolve, reject) => {
+    const stop = (): void => {
+      reject(new DOMException('The cell is no longer wanted.', 'AbortError'));
+    };
+    if (signal.aborted) stop();
+    signal.addEventListener('abort', stop, { once: true });
+    promise.then(resolve, reject).finally(() => signal.removeEventListener('abort', stop));
+  });
+}

@@ -1,0 +1,136 @@
+/** Everything of a walk that lives on the graphics card; built anew when a context was lost. */
+
+import {
+  CellStreamer,
+  UploadScheduler,
+  type Cell,
+  type CellBuilder,
+  type CellIndex,
+  type FetchQueue,
+  type Manifest,
+} from '@farfield/core';
+import { Vector4, type Camera, type Group, type IUniform, type WebGLRenderer } from 'three';
+import { AttributeUpload } from './attribute-upload.js';
+import { CellLoader } from './cell-loader.js';
+import type { CellView } from './cell-view.js';
+import { createFarMaterial } from './far-material.js';
+import { lightUniforms } from './light.js';
+import { NearMaterials } from './near-materials.js';
+import { NearTextures } from './near-textures.js';
+import { PagePool } from './page-pool.js';
+import { createSky, type Sky } from './sky.js';
+
+export interface StageOptions {
+  readonly renderer: WebGLRenderer;
+  readonly manifest: Manifest;
+  readonly index: CellIndex;
+  readonly queue: FetchQueue;
+  readonly builder: CellBuilder;
+  readonly group: Group;
+  readonly camera: () => Camera | undefined;
+  readonly textureBytes: number;
+  readonly geometryBytes: number;
+  readonly prefetch: number;
+  readonly sky: boolean;
+  readonly backgroundAlpha: IUniform<number>;
+  readonly onReady: (cell: Cell, seconds: number) => void;
+  readonly onError: (cell: Cell, error: Error) => void;
+}
+
+/** Share of the texture memory that atlas pages get; textures of near geometry get the rest. */
+const PAGE_SHARE = 0.6;
+
+export class Stage {
+  readonly uploads = new UploadScheduler();
+  readonly attributes: AttributeUpload;
+  readonly pages: PagePool;
+  readonly textures: NearTextures;
+  readonly streamer: CellStreamer<CellView>;
+  readonly sky: Sky | undefined;
+  private readonly materials: NearMaterials;
+  private readonly farMaterial;
+  private readonly loader: CellLoader;
+
+  constructor(options: StageOptions) {
+    const { renderer, manifest, index, queue, builder, group } = options;
+    const light = lightUniforms(manifest.walk.light);
+    const { uploads } = this;
+    const pressure = (priority: number): boolean => this.streamer.evict(priority);
+    this.attributes = new AttributeUpload(uploads);
+    this.pages = new PagePool({
+      renderer,
+      manifest,
+      queue,
+      uploads,
+      capacity: PAGE_SHARE * options.textureBytes,
+      pressure,
+    });
+    this.textures = new NearTextures({
+      renderer,
+      queue,
+      uploads,
+      capacity: Math.max(0, options.textureBytes - this.pages.bytes),
+      pressure,
+    });
+    this.materials = new NearMaterials(light, manifest.walk.near_field);
+    this.farMaterial = createFarMaterial(this.pages.texture);
+    this.loader = new CellLoader({
+      manifest,
+      queue,
+      builder,
+      pages: this.pages,
+      textures: this.textures,
+      materials: this.materials,
+      farMaterial: this.farMaterial,
+      attributes: this.attributes,
+      compile: async (view) => {
+        const camera = options.camera();
+        if (camera !== undefined) await renderer.compileAsync(view.group, camera);
+        this.prepare(view);
+      },
+    });
+    this.streamer = new CellStreamer({
+      index,
+      load: async (job) => {
+        const loaded = await this.loader.load(job);
+        group.add(loaded.view.group);
+        return loaded;
+      },
+      dispose: (view) => view.dispose(),
+      capacity: options.geometryBytes,
+      prefetch: options.prefetch,
+      onReady: options.onReady,
+      onError: options.onError,
+    });
+    this.sky = options.sky ? createSky(light, options.backgroundAlpha) : undefined;
+    group.add(this.attributes.group, ...(this.sky === undefined ? [] : [this.sky]));
+  }
+
+  dispose(): void {
+    this.streamer.dispose();
+    this.loader.dispose();
+    this.pages.dispose();
+    this.textures.clear();
+    this.materials.dispose();
+    this.farMaterial.dispose();
+    this.attributes.group.removeFromParent();
+    this.attributes.dispose();
+    this.sky?.removeFromParent();
+    this.sky?.geometry.dispose();
+    this.sky?.material.dispose();
+  }
+
+  /** Tell near meshes where the top of the picture is, for the dither pattern. */
+  private prepare(view: CellView): void {
+    const { top } = this.materials;
+    const viewport = new Vector4();
+    for (const mesh of view.near) {
+      mesh.onBeforeRender = (renderer) => {
+        renderer.getCurrentViewport(viewport);
+        if (top.value === viewport.y + viewport.w) return;
+        top.value = viewport.y + viewport.w;
+        mesh.material.uniformsNeedUpdate = true;
+      };
+    }
+  }
+}

@@ -1,0 +1,96 @@
+"""The layers of one face, compiled: fill gaps, remove hidden texels, cut into rectangles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from farfield_worker.compile import bitplanes
+from farfield_worker.compile.best import best
+from farfield_worker.compile.gaps import columns, fill_gaps, sources
+from farfield_worker.compile.greedy import greedy
+from farfield_worker.compile.hidden import hidden, reaches
+from farfield_worker.render.interface import FaceTexels
+
+GROWERS = {"greedy": greedy, "best": best}
+
+
+class Rules(NamedTuple):
+    """How layers are compiled.
+
+    Attributes:
+        layers: distances of the layers, far to near, metres.
+        resolution: texels across a face.
+        reach: most layers that a surface may pass from texel to texel and still be filled.
+        grower: how texels become rectangles.
+        largest: most texels along an edge of a rectangle.
+    """
+
+    layers: Sequence[float]
+    resolution: int
+    reach: int
+    grower: Literal["greedy", "best"]
+    largest: int
+
+
+class CompiledFace(NamedTuple):
+    """Texels of one face and the rectangles they are in.
+
+    Attributes:
+        texel: (n,) int32, row * resolution + column, in order of (layer, texel).
+        color: (n,) uint32, little-endian RGBA.
+        owner: (n,) int32, the rectangle of each texel.
+        boxes: (m, 5) int32, layer, x, y, width and height of each rectangle.
+        rendered: texels before anything was filled or removed.
+        filled: texels that gap filling added and hidden-texel removal left.
+    """
+
+    texel: NDArray[np.int32]
+    color: NDArray[np.uint32]
+    owner: NDArray[np.int32]
+    boxes: NDArray[np.int32]
+    rendered: int
+    filled: int
+
+
+def compile_face(
+    texels: FaceTexels, rules: Rules, half: tuple[float, float, float]
+) -> CompiledFace:
+    """Compile a face of a cell with `half` extents in the face's axes (right, down, forward).
+
+    `texels` may go on beyond the last layer, into the near field (`gaps`).
+    """
+    count, resolution = len(rules.layers), rules.resolution
+    shifts = reaches(rules.layers, half, resolution)
+    rings = max([1, *(max(pair) for pair in shifts)])
+    own = texels.layer < count
+    planes = bitplanes.empty(count, resolution)
+    bitplanes.put(planes, texels.texel[own], texels.layer[own])
+    starts = columns(texels, resolution)
+    filled = fill_gaps(texels, starts, planes, rings, rules.reach)
+    covered = planes | filled
+    shown = covered & ~hidden(covered, shifts)
+    texel, layer = bitplanes.listed(shown)
+    color = texels.color.view(np.uint32).reshape(-1)[sources(starts, texels.layer, texel, layer)]
+    owner = np.empty(len(texel), np.int32)
+    boxes = np.empty((len(texel), 5), np.int32)
+    boxes_made = GROWERS[rules.grower](
+        texel, layer, resolution, rules.largest, rules.largest, owner, boxes
+    )
+    return CompiledFace(
+        texel,
+        color,
+        owner,
+        boxes[:boxes_made].copy(),
+        int(own.sum()),
+        int(bitplanes.get(filled, texel, layer).sum()),
+    )
+
+
+def gutter_free(page: int, gutter: int) -> int:
+    """Longest edge of a rectangle that fits on a page `page` texels wide."""
+    return max(1, math.floor(page - 2 * gutter))

@@ -1,0 +1,1 @@
+"""A worker of the farm: the same cells and scenes, asked for over Celery."""
