@@ -1,4 +1,4 @@
-"""One view cell as slanted quads: A-buffer, visibility, sheets, quads, residuals (design, section 3).
+"""One view cell as slanted quads: A-buffer, visibility, sheets, quads, residual quads.
 
 Its inputs are numbers and a scene, its output quads with their pictures; packing, encoding and the
 cell file are those of the layer bake.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from farfield_core.scene import PreparedScene
@@ -59,7 +59,7 @@ class SlantedSettings:
     visibility: bool = True
     spread: int = 2
     residual: bool = True
-    segment: SegmentSettings = SegmentSettings()
+    segment: SegmentSettings = field(default_factory=SegmentSettings)
 
 
 @dataclass
@@ -157,9 +157,7 @@ class SlantedBaker:
         known = seen(np.concatenate(points), np.concatenate(slack), eyes, self.maps)
         ends = np.cumsum([len(f.texel) for f in fragments.values()])
         visible = {}
-        for (face, here), mask in zip(
-            fragments.items(), np.split(known, ends[:-1]), strict=True
-        ):
+        for (face, here), mask in zip(fragments.items(), np.split(known, ends[:-1]), strict=True):
             wider = spread(
                 here.texel,
                 here.disparity,

@@ -56,8 +56,8 @@ class SegmentSettings:
         seeds: how many triangles' planes are tried in a block, those that show most often.
     """
 
-    fill: float = 0.5
-    strip: float = 0.15
+    fill: float = 0.35
+    strip: float = 0.05
     blocks: tuple[int, ...] = (8, 16)
     least: tuple[int, ...] = (32, 1)
     seeds: int = 8
@@ -264,10 +264,12 @@ def _make_sheet(grid: Any, plane: Any, rect: Any, fill: float, strip: float) -> 
     _shrink(grid, plane, rect)
     texels = _grow(grid, plane, rect, fill, strip)
     other = np.empty(3)
-    if fit_plane(grid, rect, plane, other):
-        if count_texels(grid, other, rect[0], rect[1], rect[2], rect[3]) >= texels:
-            plane[:] = other
-            _grow(grid, plane, rect, fill, strip)
+    if (
+        fit_plane(grid, rect, plane, other)
+        and count_texels(grid, other, rect[0], rect[1], rect[2], rect[3]) >= texels
+    ):
+        plane[:] = other
+        _grow(grid, plane, rect, fill, strip)
     return _shrink(grid, plane, rect)
 
 
