@@ -18,7 +18,8 @@ from farfield_core.scene import PreparedScene
 from numpy.typing import NDArray
 
 from farfield_worker.gl import context as gl
-from farfield_worker.gl.scene_buffers import SceneBuffers, set_uniforms
+from farfield_worker.gl.programs import set_uniforms
+from farfield_worker.gl.scene_buffers import SceneBuffers
 from farfield_worker.render.target import VERTEX
 from farfield_worker.slanted.fragments import Fragments, sort_fragments
 from farfield_worker.slanted.near_border import walls

@@ -15,7 +15,7 @@ from farfield_core.faces import FACES, directions
 from numpy.typing import NDArray
 
 from farfield_worker.gl import context as gl
-from farfield_worker.gl.scene_buffers import set_uniforms
+from farfield_worker.gl.programs import set_uniforms
 from farfield_worker.slanted.quads import SlantedQuads
 
 Floats = NDArray[np.float64]
