@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from farfield_worker.shoot.view import NearField, Picture, View
 from farfield_worker.shoot.walk import WalkShooter
 from farfield_worker.verify.metrics import Shot, compare, eroded, unmatched
 from PIL import Image
+from playwright.sync_api import BrowserContext
 
 from tests.browser.conftest import Visit
 from tests.corridors.scenes import DATA, SCENES, Scene
@@ -34,7 +36,8 @@ from tests.corridors.scenes import DATA, SCENES, Scene
 SOAK = os.environ.get("FARFIELD_SOAK") == "1"
 RESOLUTION, LAYERS, CELLS = (512, 64, 4) if SOAK else (256, 24, 2)
 SIZE = 512 if SOAK else 256
-RESULTS = Path(__file__).parents[2] / "bench" / "results"
+ROOT = Path(__file__).parents[2]
+RESULTS, PICTURES = ROOT / "bench" / "results", ROOT / "docs" / "pictures"
 
 pytestmark = pytest.mark.data
 needs_data = pytest.mark.skipif(
@@ -49,6 +52,11 @@ def bake(scene: Scene, model: Path, folder: Path) -> Path:
     edge = scene.cell_size
     corridor["path"]["points"] = [[x, y, z], [x + (CELLS - 1.2) * edge, y, z]]
     corridor["path"]["width"] = 0.01 * edge
+    return run_bake(model, corridor, edge, folder)
+
+
+def run_bake(model: Path, corridor: dict[str, Any], edge: float, folder: Path) -> Path:
+    """Run `farfield bake`; returns the folder of its walk.json."""
     file = folder / "corridor.json"
     file.write_text(json.dumps(corridor), encoding="utf-8")
     result = subprocess.run(
@@ -89,6 +97,7 @@ def look_over(scene: Scene, model: Path, folder: Path, visit: Visit, web: Path) 
         for path in sorted((bake_folder / "cells").glob("*.json"))
     ]
     assert len(cells) == walk.grid.total >= 2
+    assert max(cell.figures["peak_megabytes"] for cell in cells) < 2048
     prepared = open_scene(folder / "out" / prepared_prefix(walk.scene.id))
     walks, scenes = WalkShooter(bake_folder), SceneShooter(prepared)
     clip = 0.01 * min(walk.grid.size)
@@ -140,6 +149,36 @@ def test_a_real_model_is_baked_and_walked(
     scene: Scene, tmp_path: Path, visit: Visit, pages: Path
 ) -> None:
     look_over(scene, scene.model, tmp_path, visit, pages)
+
+
+def test_the_picture_in_the_readme(tmp_path: Path, context: BrowserContext, pages: Path) -> None:
+    """The page as `make demo` opens it; the soak run writes the README's picture anew."""
+    from farfield_worker.demo import AVENUE, CELL_SIZE
+    from farfield_worker.demo.city import write_city
+
+    model = tmp_path / "Lake city.glb"
+    write_city(model, triangles=850_000 if SOAK else 100_000)
+    corridor = json.loads(AVENUE.read_text(encoding="utf-8"))
+    (x, y, z), _ = corridor["path"]["points"]
+    corridor["path"]["points"] = [[x, y, z], [x, y, z - 0.1 * CELL_SIZE]]
+    bake_folder = run_bake(model, corridor, CELL_SIZE, tmp_path)
+    page = context.new_page()
+    page.set_viewport_size({"width": 1280, "height": 720})
+    with served(tmp_path / "out", pages) as address:
+        page.goto(f"{address}/walk/{bake_folder.name}")
+        page.wait_for_function("window.farfield !== undefined")
+        page.evaluate("farfield.ready")
+        page.get_by_text("Near triangles").wait_for()
+        page.wait_for_timeout(3000)
+        file = tmp_path / "walk.png"
+        page.screenshot(path=file)
+    picture = np.asarray(Image.open(file).convert("RGB")).astype(int)
+    sky, ground = picture[120, 300], picture[700, 600]
+    assert sky[2] > sky[0] + 30, "the sky is blue"
+    assert ground[0] >= ground[2], "the avenue is paved in a warm grey"
+    assert len(np.unique(picture.reshape(-1, 3) // 16, axis=0)) > 150, "a city has many colours"
+    if SOAK:
+        (PICTURES / "walk.png").write_bytes(file.read_bytes())
 
 
 def test_the_demo_city_is_baked_and_walked(tmp_path: Path, visit: Visit, pages: Path) -> None:

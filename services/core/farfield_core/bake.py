@@ -18,6 +18,7 @@ from farfield_core.cells import CellGrid, Index, parse_cell_name
 from farfield_core.corridor import Corridor, Ground, cut
 from farfield_core.errors import BadInputError
 from farfield_core.ground import ground_of
+from farfield_core.placement import Placement
 from farfield_core.scene import SceneInfo
 from farfield_core.scenes import open_prepared
 from farfield_core.settings import BakeSettings
@@ -55,7 +56,7 @@ def create_bake(
         ground = ground_of(open_prepared(store, scene.id))
     grid = cut(corridor, settings.cell_size, ground)
     tables = cell_table_pages(grid)
-    placement = settings.place()
+    placement = settings.place() if settings.quads == "layers" else Placement((), ())
     walk = Walk(
         id=identity,
         name=scene.name,
@@ -66,7 +67,7 @@ def create_bake(
         resolution=settings.resolution,
         layers=placement.layers,
         borders=placement.borders,
-        near_field=placement.near_field,
+        near_field=settings.near_field,
         grid=tables.grid,
         atlas=AtlasFormat(width=ATLAS_SIZE, height=ATLAS_SIZE, encoding=settings.encoder),
         light={name: (c[0], c[1], c[2]) for name, c in default_light().items()},

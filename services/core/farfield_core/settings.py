@@ -18,7 +18,10 @@ class BakeSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    quads: Literal["layers"] = Field(default="layers", description="kind of impostor quads")
+    quads: Literal["layers", "slanted"] = Field(
+        default="layers",
+        description="kind of impostor quads: the paper's layers, or planes of any slant",
+    )
     cell_size: tuple[Positive, Positive, Positive] = Field(
         default=(10.0, 10.0, 10.0),
         description="edge lengths of a view cell, metres; one number means a cube",
@@ -26,7 +29,8 @@ class BakeSettings(BaseModel):
     layers: int = Field(default=64, ge=1, le=4096, description="number of layers")
     near: Positive | None = Field(
         default=None,
-        description="wanted half width of the near field, metres; chooses the number of layers",
+        description="half width of the near field, metres; with layers it chooses their number, "
+        "without it the near field is the one that `layers` layers have",
     )
     alpha: Annotated[float, Field(gt=0, lt=0.7853)] | None = Field(
         default=None,
@@ -36,6 +40,9 @@ class BakeSettings(BaseModel):
     gap_texels: Positive | None = Field(
         default=1.0,
         description="how many texels two neighbouring layers may shift by; none means no bound",
+    )
+    tolerance: Annotated[float, Field(gt=0, le=1)] = Field(
+        default=0.68, description="share of the parallax bound that slanted quads use"
     )
     resolution: int = Field(default=512, ge=16, le=4096, description="texels across a face")
     faces: Literal["auto", "sides", "all"] = Field(
@@ -91,6 +98,13 @@ class BakeSettings(BaseModel):
         return placement.place(
             self.half_extents, self.resolution, count, self.alpha, self.gap_texels
         )
+
+    @property
+    def near_field(self) -> float:
+        """Half width of the near field, metres."""
+        if self.quads == "slanted" and self.near is not None:
+            return self.near
+        return self.place().near_field
 
     def key(self) -> str:
         """Hash of the settings that change what a bake contains."""

@@ -18,6 +18,7 @@ from farfield_core.scene import PreparedScene
 from numpy.typing import NDArray
 
 from farfield_worker.gl import context as gl
+from farfield_worker.gl.programs import set_uniforms
 from farfield_worker.gl.scene_buffers import SceneBuffers
 from farfield_worker.render.target import VERTEX
 from farfield_worker.slanted.fragments import Fragments, sort_fragments
@@ -127,15 +128,21 @@ class ABuffer:
         with gl.current():
             for thing in (self._count, self._records):
                 thing.release()
-            if self._framebuffer is not None:
-                self._framebuffer.release()
+            self._release_framebuffer()
             self.buffers.release()
+
+    def _release_framebuffer(self) -> None:
+        if self._framebuffer is not None:
+            gl.release_framebuffer(self._framebuffer)
+            self._framebuffer = None
 
     def _begin(
         self, context: moderngl.Context, eye: Floats, face: int, near_clip: float, resolution: int
     ) -> None:
         if self._framebuffer is None or self._framebuffer.width != resolution:
-            self._framebuffer = context.framebuffer([context.texture((resolution,) * 2, 1)])
+            self._release_framebuffer()
+            picture = context.texture((resolution, resolution), 1)
+            self._framebuffer = context.framebuffer([picture])
         self._framebuffer.use()
         context.enable_only(moderngl.NOTHING)
         context.front_face = "cw"
@@ -156,7 +163,7 @@ class ABuffer:
         """Draw `count` triangles of a batch from the `first`; return how many fragments."""
         self._count.write(bytes(16))
         self.buffers.bind(self.buffers.batches[batch])
-        array.program["first"].value = first
+        set_uniforms(array.program, first=first)
         array.render(vertices=3 * count, first=3 * first)
         self.buffers.context.memory_barrier()
         return int(np.frombuffer(self._count.read(4), np.uint32)[0])

@@ -1,4 +1,4 @@
-"""One view cell as slanted quads: A-buffer, visibility, sheets, quads, residuals (design, section 3).
+"""One view cell as slanted quads: A-buffer, visibility, sheets, quads, residual quads.
 
 Its inputs are numbers and a scene, its output quads with their pictures; packing, encoding and the
 cell file are those of the layer bake.
@@ -6,9 +6,9 @@ cell file are those of the layer bake.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
 
 import numpy as np
 from farfield_core.scene import PreparedScene
@@ -29,6 +29,9 @@ from farfield_worker.visibility.from_region import cell_eyes, seen
 from farfield_worker.visibility.spread import spread
 
 Floats = NDArray[np.float64]
+
+#: times the block run in its context, under a name
+Watch = Callable[[str], AbstractContextManager[None]]
 
 _CORNERS = slice(1, 9)
 
@@ -59,7 +62,7 @@ class SlantedSettings:
     visibility: bool = True
     spread: int = 2
     residual: bool = True
-    segment: SegmentSettings = SegmentSettings()
+    segment: SegmentSettings = field(default_factory=SegmentSettings)
 
 
 @dataclass
@@ -69,13 +72,11 @@ class SlantedCell:
     Attributes:
         parts: quads by eye and face, eyes relative to the cell's centre; the centre's come first.
         fragments, seen: fragments in all A-buffers, and of those the ones that some eye can see.
-        seconds: time spent by stage.
     """
 
     parts: list[EyeQuads]
     fragments: int
     seen: int
-    seconds: dict[str, float]
 
 
 class SlantedBaker:
@@ -90,43 +91,36 @@ class SlantedBaker:
         self.maps = MapCache(self._renderer, cache)
         self._painter = QuadPainter(resolution)
 
-    def cell(self, centre: Sequence[float] | Floats, settings: SlantedSettings) -> SlantedCell:
-        """Quads of the cell around `centre` (3,), scene coordinates."""
+    def cell(
+        self,
+        centre: Sequence[float] | Floats,
+        settings: SlantedSettings,
+        watch: Watch | None = None,
+    ) -> SlantedCell:
+        """Quads of the cell around `centre` (3,), scene coordinates; `watch` times the stages."""
+        stage = watch or (lambda kind: nullcontext())
         c = np.asarray(centre, np.float64)
-        cell = SlantedCell([], 0, 0, {})
-        clock = _Clock(cell.seconds)
-        fragments = {
-            face: self._abuffer.fragments(c, face, settings.near, self.resolution)
-            for face in settings.faces
-        }
+        cell = SlantedCell([], 0, 0)
+        with stage("render"):
+            fragments = {
+                face: self._abuffer.fragments(c, face, settings.near, self.resolution)
+                for face in settings.faces
+            }
         cell.fragments = sum(len(f.texel) for f in fragments.values())
-        clock.lap("abuffer")
         if settings.visibility:
-            fragments = self._visible(c, fragments, settings)
+            with stage("visibility"):
+                fragments = self._visible(c, fragments, settings)
         cell.seen = sum(len(f.texel) for f in fragments.values())
-        clock.lap("visibility")
         self._painter.clear()
-        for face, here in fragments.items():
-            if len(here.texel):
-                part = self._centre_quads(c, face, here, settings)
-                cell.parts.append(part)
-                self._painter.add(part.face, part.eye, part.quads)
-        clock.lap("sheets")
+        with stage("sheets"):
+            for face, here in fragments.items():
+                if len(here.texel):
+                    part = self._centre_quads(c, face, here, settings)
+                    cell.parts.append(part)
+                    self._painter.add(part.face, part.eye, part.quads)
         if settings.residual:
-            cell.parts += residual_quads(
-                self.scene,
-                self.maps,
-                self._painter,
-                c,
-                np.asarray(settings.half_extents, np.float64),
-                cell_eyes(np.zeros(3), np.asarray(settings.half_extents))[_CORNERS],
-                settings.faces,
-                settings.alpha,
-                settings.near,
-                settings.tolerance,
-                settings.segment,
-            )
-        clock.lap("residual")
+            with stage("residual"):
+                cell.parts += self._residuals(c, settings)
         return cell
 
     def close(self) -> None:
@@ -157,9 +151,7 @@ class SlantedBaker:
         known = seen(np.concatenate(points), np.concatenate(slack), eyes, self.maps)
         ends = np.cumsum([len(f.texel) for f in fragments.values()])
         visible = {}
-        for (face, here), mask in zip(
-            fragments.items(), np.split(known, ends[:-1]), strict=True
-        ):
+        for (face, here), mask in zip(fragments.items(), np.split(known, ends[:-1]), strict=True):
             wider = spread(
                 here.texel,
                 here.disparity,
@@ -170,6 +162,23 @@ class SlantedBaker:
             )
             visible[face] = here.take(wider)
         return visible
+
+    def _residuals(self, centre: Floats, settings: SlantedSettings) -> list[EyeQuads]:
+        """Quads of the cell's corners; what the painter holds is what there is so far."""
+        half = np.asarray(settings.half_extents, np.float64)
+        return residual_quads(
+            self.scene,
+            self.maps,
+            self._painter,
+            centre,
+            half,
+            cell_eyes(np.zeros(3), half)[_CORNERS],
+            settings.faces,
+            settings.alpha,
+            settings.near,
+            settings.tolerance,
+            settings.segment,
+        )
 
     def _centre_quads(
         self, centre: Floats, face: int, fragments: Fragments, settings: SlantedSettings
@@ -185,16 +194,3 @@ class SlantedBaker:
             settings.segment,
         )
         return EyeQuads(np.zeros(3), face, quads)
-
-
-class _Clock:
-    """Adds up the time between laps by name."""
-
-    def __init__(self, seconds: dict[str, float]) -> None:
-        self._seconds = seconds
-        self._last = time.perf_counter()
-
-    def lap(self, name: str) -> None:
-        now = time.perf_counter()
-        self._seconds[name] = now - self._last
-        self._last = now

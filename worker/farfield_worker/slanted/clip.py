@@ -77,7 +77,7 @@ def clip_half_plane(polygon: Floats, line: Floats) -> Floats:
             out.append(polygon[i] + t * (polygon[j] - polygon[i]))
     corners = np.array(out).reshape(-1, 2)
     apart = np.abs(corners - np.roll(corners, 1, axis=0)).max(axis=1, initial=0.0) > MERGED
-    return corners[apart]
+    return np.asarray(corners[apart])
 
 
 def texel_line(plane: Floats, resolution: int) -> Floats:

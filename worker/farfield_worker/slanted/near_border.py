@@ -12,9 +12,9 @@ Where the surface itself goes on inside, as polygons, the quad is cut off at the
 from __future__ import annotations
 
 import numpy as np
+from farfield_core.faces import FACES
 from numpy.typing import NDArray
 
-from farfield_core.faces import FACES
 from farfield_worker.slanted.clip import clip_half_plane, texel_line
 
 Floats = NDArray[np.float64]
@@ -44,7 +44,9 @@ def walls(face: int, eye: Floats, near: float) -> Floats:
     return np.asarray(all_planes[first])
 
 
-def inside(disparity: Floats, u: Floats, v: Floats, wall_planes: Floats) -> NDArray[np.bool_]:
+def inside(
+    disparity: NDArray[np.floating], u: Floats, v: Floats, wall_planes: Floats
+) -> NDArray[np.bool_]:
     """Whether points of `disparity` (n,) at (u, v) (n,), (n,) lie in the near cube: (n,) bool."""
     borders = wall_planes[:, :1] * u + wall_planes[:, 1:2] * v + wall_planes[:, 2:]
     return np.asarray(disparity > borders.max(axis=0))

@@ -15,6 +15,7 @@ from farfield_core.faces import FACES, directions
 from numpy.typing import NDArray
 
 from farfield_worker.gl import context as gl
+from farfield_worker.gl.programs import set_uniforms
 from farfield_worker.slanted.quads import SlantedQuads
 
 Floats = NDArray[np.float64]
@@ -127,9 +128,7 @@ class QuadPainter:
         self._parts.append(part)
         self._forget()
 
-    def draw(
-        self, face: int, eye: Floats
-    ) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    def draw(self, face: int, eye: Floats) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
         """Disparity and colour shown on `face` of `eye` (3,), relative to the cell's centre.
 
         Both (resolution, resolution), row 0 on top; 0 where there is nothing.
@@ -143,9 +142,7 @@ class QuadPainter:
             self._framebuffer.clear(depth=0.0)
             self._shown.write(bytes(8 * self.resolution * self.resolution))
             axes = {"eye": eye, "right": right, "down": down, "forward": forward}
-            for name, value in axes.items():
-                self._program[name].value = tuple(value)
-            self._program["near"].value = _NEAR
+            set_uniforms(self._program, near=_NEAR, **{k: tuple(v) for k, v in axes.items()})
             if self._array is not None:
                 self._texel_buffer.bind_to_storage_buffer(0)
                 self._array.render(moderngl.TRIANGLES)
@@ -157,8 +154,8 @@ class QuadPainter:
         """Free what the GPU holds."""
         with gl.current():
             self.clear()
-            for thing in (self._program, self._framebuffer, self._shown, self._depth):
-                thing.release()
+            gl.release_framebuffer(self._framebuffer)
+            self._program.release()
 
     def _upload(self, context: moderngl.Context) -> None:
         if self._array is not None or not any(len(p.vertices) for p in self._parts):

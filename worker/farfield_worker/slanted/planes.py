@@ -10,10 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-
 from farfield_core.faces import FACES
 from farfield_core.scene import PreparedScene
+from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 

@@ -35,6 +35,7 @@ class SlantedQuads(NamedTuple):
         sheet: (q,) int32, the sheet of each quad; several quads may show one.
         polygons: q arrays (k, 2) float, texels, convex, 3 <= k <= 8.
         plane: (q, 3) float, a, b, c of the disparity plane.
+        texel, disparity: (n,) int32, (n,) float, the fragments they were made from.
         sheets: the sheets as segmented.
         texels: what each sheet draws.
         images: one (h, w, 4) uint8 picture per sheet, its rectangle `texels.rect`; sRGB, alpha 0
@@ -44,6 +45,8 @@ class SlantedQuads(NamedTuple):
     sheet: Ints
     polygons: list[Floats]
     plane: Floats
+    texel: Ints
+    disparity: Floats
     sheets: Sheets
     texels: SheetTexels
     images: list[NDArray[np.uint8]]
@@ -104,6 +107,8 @@ def face_quads(
         np.array(sheet, np.int32),
         polygons,
         np.array(planes).reshape(-1, 3),
+        fragments.texel,
+        disparity,
         sheets,
         texels,
         sheet_images(texels, fragments.color, resolution),
@@ -154,7 +159,10 @@ def limit_corners(polygon: Floats) -> list[Floats]:
     if len(polygon) <= MOST_CORNERS:
         return [polygon]
     half = len(polygon) // 2
-    return [*limit_corners(polygon[: half + 1]), *limit_corners(np.vstack([polygon[half:], polygon[:1]]))]
+    return [
+        *limit_corners(polygon[: half + 1]),
+        *limit_corners(np.vstack([polygon[half:], polygon[:1]])),
+    ]
 
 
 def _drop(sheets: Sheets, least: int) -> Sheets:

@@ -122,9 +122,12 @@ def far_texels(truth: DepthMap, face: int, eye: Floats, near: float) -> Mask:
 def map_fragments(truth: DepthMap, which: Mask) -> Fragments:
     """Texels of a map where `which` (h, w), as fragments; those without a surface are left out."""
     texel = np.flatnonzero(which & (truth.disparity > 0)).astype(np.int32)
-    columns = (truth.disparity, truth.color, truth.triangle)
-    disparity, color, triangle = (column.reshape(-1)[texel] for column in columns)
-    return Fragments(texel, disparity, color, triangle)
+    return Fragments(
+        texel,
+        truth.disparity.reshape(-1)[texel],
+        truth.color.reshape(-1)[texel],
+        truth.triangle.reshape(-1)[texel],
+    )
 
 
 def _around(values: NDArray[np.generic]) -> list[NDArray[np.generic]]:

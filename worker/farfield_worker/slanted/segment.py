@@ -53,13 +53,15 @@ class SegmentSettings:
         strip: least share of a strip's texels for it to be taken in.
         blocks: edge of the seeding blocks of each pass, texels.
         least: texels a sheet needs in each pass; the last is 1, so that nothing is left.
+        largest: longest edge of a sheet, texels: what an atlas page takes.
         seeds: how many triangles' planes are tried in a block, those that show most often.
     """
 
-    fill: float = 0.5
-    strip: float = 0.15
+    fill: float = 0.35
+    strip: float = 0.05
     blocks: tuple[int, ...] = (8, 16)
     least: tuple[int, ...] = (32, 1)
+    largest: int = 1020
     seeds: int = 8
 
 
@@ -119,13 +121,14 @@ def segment(
             least,
             knobs.fill,
             knobs.strip,
+            knobs.largest,
             knobs.seeds,
         )
     return Sheets(rects[:count].copy(), sheet_planes[:count].copy(), owner)
 
 
 @njit(cache=True)
-def _grow(grid: Any, plane: Any, rect: Any, fill: float, strip: float) -> int:
+def _grow(grid: Any, plane: Any, rect: Any, fill: float, strip: float, largest: int) -> int:
     """Grow `rect` in place as far as it stays full; return the texels the plane captures."""
     resolution = grid.resolution
     total = count_texels(grid, plane, rect[0], rect[1], rect[2], rect[3])
@@ -142,7 +145,9 @@ def _grow(grid: Any, plane: Any, rect: Any, fill: float, strip: float) -> int:
         else:
             y0, y1 = y1, y1 + 1
         grown = False
-        if x0 >= 0 and y0 >= 0 and x1 <= resolution and y1 <= resolution:
+        fits = max(x1, rect[2]) - min(x0, rect[0]) <= largest
+        fits = fits and max(y1, rect[3]) - min(y0, rect[1]) <= largest
+        if fits and x0 >= 0 and y0 >= 0 and x1 <= resolution and y1 <= resolution:
             found = count_texels(grid, plane, x0, y0, x1, y1)
             area = (x1 - x0) * (y1 - y0)
             whole = (rect[2] - rect[0]) * (rect[3] - rect[1]) + area
@@ -259,15 +264,17 @@ def _best(grid: Any, candidates: Any, fragments: Any, places: Any, out: Any) -> 
 
 
 @njit(cache=True)
-def _make_sheet(grid: Any, plane: Any, rect: Any, fill: float, strip: float) -> int:
+def _make_sheet(grid: Any, plane: Any, rect: Any, fill: float, strip: float, largest: int) -> int:
     """Grow, refit and shrink `plane` and `rect` in place; return the texels it captures."""
     _shrink(grid, plane, rect)
-    texels = _grow(grid, plane, rect, fill, strip)
+    texels = _grow(grid, plane, rect, fill, strip, largest)
     other = np.empty(3)
-    if fit_plane(grid, rect, plane, other):
-        if count_texels(grid, other, rect[0], rect[1], rect[2], rect[3]) >= texels:
-            plane[:] = other
-            _grow(grid, plane, rect, fill, strip)
+    if (
+        fit_plane(grid, rect, plane, other)
+        and count_texels(grid, other, rect[0], rect[1], rect[2], rect[3]) >= texels
+    ):
+        plane[:] = other
+        _grow(grid, plane, rect, fill, strip, largest)
     return _shrink(grid, plane, rect)
 
 
@@ -283,6 +290,7 @@ def _pass(
     least: int,
     fill: float,
     strip: float,
+    largest: int,
     seeds: int,
 ) -> int:
     """One scan over all blocks; sheets of at least `least` texels are appended."""
@@ -310,7 +318,7 @@ def _pass(
                 _best(grid, candidates[:k], part, places, first)
                 plane[:] = first
                 rect[:] = square
-                if _make_sheet(grid, plane, rect, fill, strip) >= least:
+                if _make_sheet(grid, plane, rect, fill, strip, largest) >= least:
                     _capture(grid, plane, rect, count)
                     rects[count] = rect
                     sheet_planes[count] = plane

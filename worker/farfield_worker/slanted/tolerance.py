@@ -37,10 +37,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-
 from farfield_core.errors import BadInputError
 from farfield_core.faces import FACES
+from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
@@ -69,7 +68,7 @@ class Tolerance:
         cls,
         face: int,
         eye: Sequence[float] | Floats,
-        half_extents: Sequence[float],
+        half_extents: Sequence[float] | Floats,
         alpha: float,
         near: float,
         factor: float = DEFAULT_FACTOR,
@@ -87,7 +86,7 @@ class Tolerance:
                 f"A near field of {near:g} m does not reach outside the cell; "
                 f"use more than {half.max():g} m."
             )
-        if not 0 < factor:
+        if not factor > 0:
             raise BadInputError(f"A tolerance of {factor:g} of the bound leaves nothing; use 0.68.")
         if np.any(np.abs(e) > half * (1 + 1e-9)):
             raise BadInputError("The eye of a quad must lie in its view cell.")
@@ -107,7 +106,9 @@ class Tolerance:
             factor * alpha * gap / longest,
         )
 
-    def interval(self, disparity: Floats, times: float = 1.0) -> tuple[Floats, Floats]:
+    def interval(
+        self, disparity: NDArray[np.floating], times: float = 1.0
+    ) -> tuple[Floats, Floats]:
         """Lowest and highest disparity at which surfaces at `disparity` (...) may be drawn.
 
         `times` widens the tolerance. Both ends rise with the disparity, so that what is nearer is

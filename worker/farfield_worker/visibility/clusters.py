@@ -42,9 +42,11 @@ class InView(NamedTuple):
     rect: Ints
     disparity: NDArray[np.float32]
 
-    def take(self, which: NDArray[Any]) -> InView:
+    def take(self, which: NDArray[Any] | slice) -> InView:
         """Clusters at indices or a mask or slice `which`."""
-        return InView(*(column[which] for column in self))
+        return InView(
+            self.cluster[which], self.triangles[which], self.rect[which], self.disparity[which]
+        )
 
 
 class Clusters:
@@ -111,7 +113,7 @@ class Clusters:
             self._double_sided,
             (np.asarray(eye, np.float64) - self._origin).astype(np.float32),
             _axes(face).astype(np.float32),
-            np.float32(nearest),
+            nearest,
             resolution,
             kept,
             starts,
@@ -224,7 +226,11 @@ def _collect(
             near, far = np.inf, -np.inf
             for i in range(3):
                 v = indices[t, i]
-                x, y, z = positions[v, 0] - eye[0], positions[v, 1] - eye[1], positions[v, 2] - eye[2]
+                x, y, z = (
+                    positions[v, 0] - eye[0],
+                    positions[v, 1] - eye[1],
+                    positions[v, 2] - eye[2],
+                )
                 c[i, 0] = axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z
                 c[i, 1] = axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z
                 c[i, 2] = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z

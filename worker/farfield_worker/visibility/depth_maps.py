@@ -17,6 +17,7 @@ from farfield_core.scene import PreparedScene
 from numpy.typing import NDArray
 
 from farfield_worker.gl import context as gl
+from farfield_worker.gl.programs import set_uniforms
 from farfield_worker.gl.scene_buffers import SceneBuffers
 from farfield_worker.render.target import VERTEX
 from farfield_worker.visibility.clusters import Clusters, InView
@@ -71,7 +72,9 @@ class DepthMapRenderer:
     The nearest clusters of triangles are drawn first; the others only where those do not hide them.
     """
 
-    def __init__(self, scene: PreparedScene, resolution: int, clusters: Clusters | None = None) -> None:
+    def __init__(
+        self, scene: PreparedScene, resolution: int, clusters: Clusters | None = None
+    ) -> None:
         self.scene = scene
         self.resolution = resolution
         self._clusters = clusters or Clusters(scene)
@@ -102,7 +105,9 @@ class DepthMapRenderer:
             )
             for budget in ROUNDS:
                 some = int(np.searchsorted(np.cumsum(rest.triangles), budget))
-                ids.append(self._draw(context, rest.take(slice(some)), eye, face, sum(map(len, ids))))
+                ids.append(
+                    self._draw(context, rest.take(slice(some)), eye, face, sum(map(len, ids)))
+                )
                 rest = rest.take(slice(some, None))
                 if len(rest.cluster) == 0:
                     break
@@ -126,7 +131,7 @@ class DepthMapRenderer:
         arrays = self.buffers.vertex_arrays(indices)
         for batch in np.flatnonzero(np.diff(starts)).tolist():
             self.buffers.bind(self.buffers.batches[batch])
-            arrays[batch].program["first"].value = first + int(starts[batch])
+            set_uniforms(arrays[batch].program, first=first + int(starts[batch]))
             arrays[batch].render(
                 vertices=3 * int(starts[batch + 1] - starts[batch]), first=3 * int(starts[batch])
             )
@@ -144,8 +149,7 @@ class DepthMapRenderer:
     def close(self) -> None:
         """Free what the GPU holds."""
         with gl.current():
-            for thing in (self._framebuffer, self._texture, self._depth):
-                thing.release()
+            gl.release_framebuffer(self._framebuffer)
             self.buffers.release()
 
 

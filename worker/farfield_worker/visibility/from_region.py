@@ -3,10 +3,13 @@
 LEMI leaves this out (its footnote 2). Hidden are surfaces behind others from everywhere in the
 cell; that near geometry hides most of the far field in a street is what makes it worth while.
 Sampled are depth maps of the whole scene from the cell's centre, its corners and the middles of its
-faces (Wonka, Wimmer, Schmalstieg 2000 shrink occluders to make sampling safe; measured here, the
-15 eyes are enough and further ones find next to nothing). A point is seen by an eye if nothing in
-the map's texel is nearer than the point by more than the tolerance within which it may be drawn.
-Points are tested eye by eye, only those not yet seen, and a map is drawn only if any fall on it.
+faces. A point is seen by an eye if in the map's texel, or in one of the eight around, nothing is
+nearer than the point by more than the tolerance within which it may be drawn. Points are tested eye
+by eye, only those not yet seen, and a map is drawn only if any fall on it.
+
+Measured in a street of the medieval town, as shares of the far field's pixels missing at random
+eyes: 1.3e-2 for the texel alone, 3.1e-3 with its neighbours; then, spread by two texels
+(visibility/spread.py), 3.6e-4, and 1.9e-3 without the six middles.
 """
 
 from __future__ import annotations
@@ -32,14 +35,18 @@ def cell_eyes(centre: Floats, half_extents: Floats) -> Floats:
 
     The centre, the eight corners, the middles of the six faces.
     """
-    corners = [c for c in itertools.product((-1.0, 1.0), repeat=3)]
+    corners = itertools.product((-1.0, 1.0), repeat=3)
     middles = [sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
     offsets = np.array([(0.0, 0.0, 0.0), *corners, *middles])
     return np.asarray(centre + offsets * np.asarray(half_extents, np.float64))
 
 
 def seen(
-    points: Floats, slack: Floats, eyes: Floats, maps: MapSource, known: NDArray[np.bool_] | None = None
+    points: Floats,
+    slack: Floats,
+    eyes: Floats,
+    maps: MapSource,
+    known: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.bool_]:
     """Which of `points` (n, 3), scene coordinates, some of `eyes` (k, 3) can see: (n,) bool.
 
@@ -47,14 +54,15 @@ def seen(
     Points in `known` (n,) count as seen already.
     """
     result = np.zeros(len(points), np.bool_) if known is None else known.copy()
+    resolution = maps.resolution
+    face, texel = np.empty(len(points), np.int8), np.empty(len(points), np.int32)
+    disparity = np.empty(len(points))
     for eye in eyes:
-        for face in range(6):
-            texel = np.empty(len(points), np.int32)
-            disparity = np.empty(len(points))
-            resolution = maps.resolution
-            if _project(points, result, eye, _AXES[face], resolution, texel, disparity):
-                nearest = farthest_around(maps.map(eye, face).disparity).reshape(-1)
-                _test(texel, disparity, slack, nearest, result)
+        counts = np.zeros(6, np.int64)
+        _project(points, result, eye, _AXES, resolution, face, texel, disparity, counts)
+        for k in np.flatnonzero(counts).tolist():
+            nearest = farthest_around(maps.map(eye, k).disparity).reshape(-1)
+            _test(face, k, texel, disparity, slack, nearest, result)
     return result
 
 
@@ -76,31 +84,46 @@ def triangles_seen(eyes: Floats, maps: MapSource, triangles: int) -> NDArray[np.
 
 @njit(cache=True)
 def _project(
-    points: Any, known: Any, eye: Any, axes: Any, resolution: int, texel: Any, disparity: Any
-) -> int:
-    """Texel and disparity of each point on a face, texel -1 where it is not on it or known."""
-    found = 0
+    points: Any,
+    known: Any,
+    eye: Any,
+    axes: Any,
+    resolution: int,
+    face: Any,
+    texel: Any,
+    disparity: Any,
+    counts: Any,
+) -> None:
+    """Face, texel and disparity of each point not known yet, face -1 for the others."""
+    q = np.empty(3)
     for i in range(len(points)):
-        texel[i] = -1
+        face[i] = -1
         if known[i]:
             continue
-        x, y, z = points[i, 0] - eye[0], points[i, 1] - eye[1], points[i, 2] - eye[2]
-        depth = x * axes[2, 0] + y * axes[2, 1] + z * axes[2, 2]
-        right = x * axes[0, 0] + y * axes[0, 1] + z * axes[0, 2]
-        down = x * axes[1, 0] + y * axes[1, 1] + z * axes[1, 2]
-        if depth <= 0.0 or abs(right) > depth or abs(down) > depth:
+        axis = 0
+        for a in range(3):
+            q[a] = points[i, a] - eye[a]
+            if abs(q[a]) > abs(q[axis]):
+                axis = a
+        if q[axis] == 0.0:
             continue
+        k = 2 * axis + (1 if q[axis] < 0.0 else 0)
+        right = q[0] * axes[k, 0, 0] + q[1] * axes[k, 0, 1] + q[2] * axes[k, 0, 2]
+        down = q[0] * axes[k, 1, 0] + q[1] * axes[k, 1, 1] + q[2] * axes[k, 1, 2]
+        depth = abs(q[axis])
         column = min(int((right / depth + 1.0) * 0.5 * resolution), resolution - 1)
         row = min(int((down / depth + 1.0) * 0.5 * resolution), resolution - 1)
+        face[i] = k
         texel[i] = row * resolution + column
         disparity[i] = 1.0 / depth
-        found += 1
-    return found
+        counts[k] += 1
 
 
 @njit(cache=True)
-def _test(texel: Any, disparity: Any, slack: Any, nearest: Any, known: Any) -> None:
-    """Mark the points before which nothing lies."""
+def _test(
+    face: Any, k: int, texel: Any, disparity: Any, slack: Any, nearest: Any, known: Any
+) -> None:
+    """Mark the points on face k before which nothing lies."""
     for i in range(len(texel)):
-        if texel[i] >= 0 and nearest[texel[i]] <= disparity[i] + slack[i]:
+        if face[i] == k and nearest[texel[i]] <= disparity[i] + slack[i]:
             known[i] = True

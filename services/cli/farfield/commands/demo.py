@@ -7,7 +7,6 @@ import json
 import os
 import tempfile
 import time
-from importlib.resources import files
 from pathlib import Path
 
 import click
@@ -16,11 +15,11 @@ from farfield_api.service import FarfieldService
 from farfield_api.settings import ApiSettings
 from farfield_core import scenes
 from farfield_core.bake import read_walk
-from farfield_core.corridor import Corridor, parse_corridor, read_corridor
+from farfield_core.corridor import Corridor, read_corridor
 from farfield_core.errors import BakeFailedError, NotFoundError
 from farfield_core.settings import BakeSettings
 from farfield_core.store import Store
-from farfield_core.suggest import Suggestion, suggest_corridor
+from farfield_core.suggest import suggest_corridor
 from farfield_worker import demo
 
 from farfield.options import jobs_option, port_options, settings_options, store_option
@@ -62,6 +61,9 @@ def command(
 
     SCENE is a model file or the id of a scene in the store; without it the demo city is baked.
     """
+    if scene is None and corridor is None:
+        corridor = demo.AVENUE
+        settings = _with_cells(settings, demo.CELL_SIZE)
     wanted = None if corridor is None else read_corridor(corridor)
     api = ApiSettings.from_environment(os.environ, store=store, jobs=jobs)
     server = Server(host, port)
@@ -69,33 +71,23 @@ def command(
     try:
         with server.beside(create_app(api, service)):
             with warming_up():
-                if scene is None:
-                    identity = _city(service.store, detail)
-                else:
-                    identity = prepared_scene(service.store, scene).id
-            chosen = _avenue() if scene is None else None
-            bake = _begin(service, identity, wanted, chosen, settings)
+                identity = _scene(service.store, scene, detail)
+            bake = _begin(service, identity, wanted, settings)
             _watch(service, bake, f"{server.address}/walk/{bake}")
     except KeyboardInterrupt:
         click.echo("Stopped; run the same command again to go on.", err=True)
 
 
 def _begin(
-    service: FarfieldService,
-    identity: str,
-    corridor: Corridor | None,
-    chosen: Suggestion | None,
-    settings: BakeSettings,
+    service: FarfieldService, identity: str, corridor: Corridor | None, settings: BakeSettings
 ) -> str:
-    """Have a bake begun, along `chosen` or a corridor found in the scene unless one is given."""
+    """Choose a corridor if need be and have its bake begun; returns the bake's id."""
     if corridor is None:
-        chosen = chosen or _suggested(service.store, identity)
+        with working("Choosing a corridor"), tempfile.TemporaryDirectory() as folder:
+            scene = scenes.open_prepared(service.store, identity, Path(folder))
+            chosen = suggest_corridor(scene)
         corridor = chosen.corridor
-        if "cell_size" not in settings.model_fields_set:
-            edge = chosen.cell_size
-            settings = BakeSettings(
-                **settings.model_dump(exclude={"cell_size"}), cell_size=(edge, edge, edge)
-            )
+        settings = _with_cells(settings, chosen.cell_size)
     bake = service.create_bake(identity, corridor, settings)
     walk = read_walk(service.store, bake)
     # before whatever else this store still has to bake
@@ -105,20 +97,17 @@ def _begin(
     return bake
 
 
-def _suggested(store: Store, scene: str) -> Suggestion:
-    """A corridor found in a prepared scene."""
-    with working("Choosing a corridor"), tempfile.TemporaryDirectory() as folder:
-        return suggest_corridor(scenes.open_prepared(store, scene, Path(folder)))
+def _with_cells(settings: BakeSettings, edge: float) -> BakeSettings:
+    """Settings with cubic cells of this edge, unless they say how large cells are."""
+    if "cell_size" in settings.model_fields_set:
+        return settings
+    return BakeSettings(**settings.model_dump(exclude={"cell_size"}), cell_size=(edge, edge, edge))
 
 
-def _avenue() -> Suggestion:
-    """The demo city's own walk, down the avenue to the great temple."""
-    text = files(demo).joinpath("corridors/avenue.json").read_bytes()
-    return Suggestion(parse_corridor(text), cell_size=14.0)
-
-
-def _city(store: Store, detail: int) -> str:
-    """Id of the demo city, which is built once for each store."""
+def _scene(store: Store, scene: str | None, detail: int) -> str:
+    """A prepared scene's id: the one asked for, or the demo city, built once for each store."""
+    if scene is not None:
+        return prepared_scene(store, scene).id
     key = f"demo/city-{detail}-{_city_version()}.json"
     try:
         city = str(json.loads(store.get(key))["scene"])

@@ -3,7 +3,7 @@
  * which only those near the walker are loaded, so a million cells cost no more than a thousand.
  */
 
-import { boxDistance, type Cell } from './cells.js';
+import { boxDistance, cellDistance, type Cell } from './cells.js';
 import { CellLookup } from './cell-table.js';
 import { FarfieldError } from './errors.js';
 import type { CellPage, CellTable, Vec3, WalkGrid } from './format.js';
@@ -76,12 +76,15 @@ export class CellIndex {
     }
   }
 
-  /** Load the page nearest to the point, wherever that is, so that `nearest` finds something. */
+  /** Load what it takes for `nearest` to find the nearest cell, wherever that is. */
   async ensureNearest(point: Vec3): Promise<void> {
     const distances = this.pages.map(({ page }) =>
       boxDistance(page.bounds.min, page.bounds.max, point),
     );
     await this.ensure(point, Math.min(...distances));
+    // A page's bounds may be nearer than its cells are, and another page's cells nearer still.
+    const found = this.nearest(point);
+    if (found !== undefined) await this.ensure(point, cellDistance(found, point));
   }
 
   /** The cell that contains the point, if it exists and its page is loaded. */

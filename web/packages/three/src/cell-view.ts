@@ -42,7 +42,7 @@ export class CellView {
     this.group.visible = false;
     this.near = batches.map((batch, n) => mesh(nearGeometry(batch), nearMaterials[n], 0));
     this.far = this.quads === 0 ? undefined : mesh(farGeometry(cell, slots), farMaterial, 1);
-    this.group.add(...this.near);
+    for (const object of this.near) this.group.add(object);
     if (this.far !== undefined) this.group.add(this.far);
     this.nearTriangles = batches.reduce((sum, { indices }) => sum + indices.length / 3, 0);
     this.bytes = this.geometries.reduce((sum, geometry) => sum + geometryBytes(geometry), 0);

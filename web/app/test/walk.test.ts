@@ -1,0 +1,172 @@
+import { CellIndex, type Vec3 } from '@farfield/core';
+import fc from 'fast-check';
+import { describe, expect, test } from 'vitest';
+import { readBakes } from '../src/landing/bakes.js';
+import { formatPose, isCapture, manifestUrl, parsePose } from '../src/walk/address.js';
+import { explain } from '../src/walk/state.js';
+import { STILL, Walker, walkingSpeed } from '../src/walk/walker.js';
+
+describe('addresses', () => {
+  test.each([
+    ['http://h/walk/abc', 'http://h/api/v1/walks/abc/walk.json'],
+    ['http://h/walk/abc/', 'http://h/api/v1/walks/abc/walk.json'],
+    ['http://h/walk/index.html?walk=../bakes/b/walk.json', 'http://h/bakes/b/walk.json'],
+    ['http://h/x/?walk=https://o.org/w.json', 'https://o.org/w.json'],
+    ['http://h/walk/index.html', undefined],
+    ['http://h/walk/', undefined],
+    ['http://h/', undefined],
+  ])('%s opens %s', (page, manifest) => {
+    expect(manifestUrl(new URL(page))).toBe(manifest);
+  });
+
+  test('a place in the corridor survives the address', () => {
+    const number = fc.double({ min: -5000, max: 5000, noNaN: true });
+    fc.assert(
+      fc.property(fc.tuple(number, number, number), number, number, (eye, yaw, pitch) => {
+        const back = parsePose(formatPose({ eye, yaw, pitch }));
+        expect(back).toBeDefined();
+        eye.forEach((value, axis) => expect(back?.eye[axis]).toBeCloseTo(value, 2));
+        expect(back?.yaw).toBeCloseTo(yaw, 3);
+        expect(back?.pitch).toBeCloseTo(pitch, 3);
+      }),
+    );
+  });
+
+  test.each(['', '#', '#at=', '#at=1,2', '#at=1,2,x', '#at=1,,3', '#at=1,2,3,4,5,6', '#to=1,2,3'])(
+    '%s is no place',
+    (hash) => {
+      expect(parsePose(hash)).toBeUndefined();
+    },
+  );
+
+  test('capture is asked for', () => {
+    expect(isCapture(new URL('http://h/walk/a?capture'))).toBe(true);
+    expect(isCapture(new URL('http://h/walk/a'))).toBe(false);
+  });
+});
+
+const corridor = (size: Vec3, lift = 0): CellIndex =>
+  new CellIndex({
+    origin: [0, 0, 0],
+    size,
+    total: 4,
+    cells: { i: [0, 1, 2, 3], j: [0, 0, 0, 0], k: [0, 0, 0, 0], y: [0, lift, 2 * lift, 3 * lift] },
+  });
+
+const walkFor = (
+  walker: Walker,
+  index: CellIndex,
+  seconds: number,
+  intent: object,
+  brake = 1,
+): void => {
+  for (let n = 0; n < 60 * seconds; n++) {
+    walker.step(1 / 60, { ...STILL, ...intent }, index, () => brake);
+  }
+};
+
+describe('Walker', () => {
+  const start = (eye: Vec3, yaw = 0): Walker => {
+    const walker = new Walker();
+    walker.place({ eye, yaw, pitch: 0 });
+    return walker;
+  };
+
+  test('yaw 0 walks along -z, a quarter left along -x, a quarter right along +x', () => {
+    const index = corridor([10, 4, 10]);
+    for (const [yaw, x, z] of [
+      [0, 0, -1],
+      [Math.PI / 2, -1, 0],
+      [-Math.PI / 2, 1, 0],
+    ] as const) {
+      const walker = start([15, 2, 5], yaw);
+      walkFor(walker, index, 1, { forward: 1 });
+      expect(Math.sign(Math.round(walker.eye[0] - 15))).toBe(x);
+      expect(Math.sign(Math.round(walker.eye[2] - 5))).toBe(z);
+    }
+  });
+
+  test('walks at walking speed, four times as fast in a hurry, and no faster across', () => {
+    const index = corridor([100, 4, 100]);
+    const distance = (intent: object): number => {
+      const walker = start([150, 2, 50]);
+      walker.direct = true;
+      walkFor(walker, index, 1, intent);
+      return Math.hypot(walker.eye[0] - 150, walker.eye[2] - 50);
+    };
+    expect(distance({ forward: 1 })).toBeCloseTo(walkingSpeed(100), 6);
+    expect(distance({ forward: 1, right: 1 })).toBeCloseTo(walkingSpeed(100), 6);
+    expect(distance({ forward: 1, fast: true })).toBeCloseTo(4 * walkingSpeed(100), 6);
+  });
+
+  test('speed is a person’s where cells are a few metres, in proportion where they are not', () => {
+    expect(walkingSpeed(4)).toBeCloseTo(1.4);
+    expect(walkingSpeed(14)).toBeGreaterThan(1.4);
+    expect(walkingSpeed(14)).toBeLessThan(4);
+    expect(walkingSpeed(1)).toBeCloseTo(0.35);
+    expect(walkingSpeed(2000)).toBeCloseTo(700);
+  });
+
+  test('keeps its height above cells that climb', () => {
+    const index = corridor([4, 3, 4], 0.5);
+    const walker = start([1, 1.6, 2], -Math.PI / 2);
+    walkFor(walker, index, 9, { forward: 1 });
+    walkFor(walker, index, 2, {});
+    const cell = index.at(walker.eye);
+    expect(cell?.name).toBe('3_0_0');
+    expect(walker.eye[1] - (cell?.low[1] ?? 0)).toBeCloseTo(1.6, 2);
+  });
+
+  test('flies where it looks, and only then', () => {
+    const index = corridor([10, 40, 10]);
+    for (const flying of [false, true]) {
+      const walker = start([15, 2, 9]);
+      walker.place({ eye: [15, 2, 9], yaw: 0, pitch: 0.5 });
+      walker.flying = flying;
+      walkFor(walker, index, 2, { forward: 1 });
+      expect(walker.eye[1] > 2.5).toBe(flying);
+    }
+  });
+
+  test('waits where it is told to', () => {
+    const index = corridor([10, 4, 10]);
+    const walker = start([15, 2, 5]);
+    walkFor(walker, index, 1, { forward: 1 }, 0);
+    expect(walker.eye).toEqual([15, 2, 5]);
+  });
+
+  test('says when a wall stops it, and looks no further than straight up', () => {
+    const index = corridor([10, 4, 10]);
+    const walker = start([15, 2, 5]);
+    walkFor(walker, index, 5, { forward: 1, pitch: 0.1 });
+    expect(walker.blocked).toBe(true);
+    expect(walker.eye[2]).toBeGreaterThan(0);
+    expect(walker.pitch).toBeLessThan(Math.PI / 2);
+  });
+
+  test('someone outside is put into the corridor', () => {
+    const index = corridor([10, 4, 10]);
+    const walker = start([-100, 50, 200]);
+    walker.enter(index);
+    expect(index.at(walker.eye)?.name).toBe('0_0_0');
+  });
+});
+
+describe('words', () => {
+  test('the list of bakes is read whatever shape it comes in', () => {
+    const bake = { id: 'b', name: 'City', cells: { done: 2, total: 4 } };
+    const wanted = [{ id: 'b', name: 'City', progress: '2 of 4 cells' }];
+    expect(readBakes([bake])).toEqual(wanted);
+    expect(readBakes({ bakes: [bake] })).toEqual(wanted);
+    expect(readBakes({ items: [bake, { name: 'no id' }, null, 3] })).toEqual(wanted);
+    expect(readBakes([{ id: 'b' }])).toEqual([{ id: 'b', name: 'b', progress: '' }]);
+    expect(readBakes('nothing')).toEqual([]);
+  });
+
+  test('errors have a title, and unknown ones keep their text', () => {
+    const error = Object.assign(new Error('No network.'), { code: 'network' });
+    expect(explain(error).text).toBe('No network.');
+    expect(explain(new Error('Odd.'))).toEqual({ title: 'Something went wrong', text: 'Odd.' });
+    expect(explain(Object.assign(new Error(''), { code: 'not-found' })).title).toContain('no walk');
+  });
+});
