@@ -18,7 +18,7 @@ class Plan(BaseModel):
     Attributes:
         cells: number of view cells.
         near_field: half width of the near-field cube, metres.
-        layers: number of layers.
+        layers: number of layers, 0 where quads are slanted.
         megabytes: atlas pages and cell files, 10^6 bytes.
         seconds: work of one process; divide by the number of processes.
         quads: quads of a cell.
@@ -56,17 +56,25 @@ REFERENCE_LAYERS = 64
 REFERENCE_RESOLUTION = 512
 REFERENCE_TRIANGLES = 850_000
 
-#: One cell of the demo city, 14 m, 512 texels, 64 layers, by one process on a CPU without a GPU:
-#: means over two to twelve cells of its avenue. Exponents of layers between 16 and 64 layers and
-#: (on a prototype) 328, those of texels between 256, 512 and 1024. How seconds depend on layers,
-#: texels and triangles is that of a prototype's renderer.
-COSTS = {
-    "seconds": _Cost(value=1.5, layers=0.8, texels=0.8, triangles=0.5),
-    "bytes": _Cost(value=1.15e6, layers=0.9, texels=0.85, triangles=0.0),
-    "quads": _Cost(value=20.1e3, layers=1.2, texels=0.8, triangles=0.0),
+#: One cell of the demo city, 14 m, 512 texels, by one process on a CPU without a GPU: means over two
+#: to twelve cells of its avenue, 64 layers, or slanted quads with the near field of 64 layers.
+#: Exponents: for layers from 16 and 200 layers (slanted: the near field that 200 layers have), for
+#: texels of layers from 256 and 1024. What slanted quads cost at other resolutions, and how seconds
+#: depend on anything, is that of a prototype.
+COSTS: dict[str, dict[str, _Cost]] = {
+    "layers": {
+        "seconds": _Cost(value=1.5, layers=0.8, texels=0.8, triangles=0.5),
+        "bytes": _Cost(value=1.15e6, layers=0.9, texels=0.85, triangles=0.0),
+        "quads": _Cost(value=20.1e3, layers=1.2, texels=0.8, triangles=0.0),
+    },
+    "slanted": {
+        "seconds": _Cost(value=7.0, layers=0.1, texels=0.8, triangles=0.3),
+        "bytes": _Cost(value=0.93e6, layers=0.44, texels=0.85, triangles=0.0),
+        "quads": _Cost(value=3.3e3, layers=0.5, texels=0.77, triangles=0.0),
+    },
 }
 #: bytes of a quad in a cell's file, before the server compresses it
-QUAD_BYTES = 106.0
+QUAD_BYTES = {"layers": 106.0, "slanted": 144.0}
 
 
 def plan(scene: SceneInfo, corridor: Corridor, settings: BakeSettings) -> Plan:
@@ -79,12 +87,15 @@ def plan(scene: SceneInfo, corridor: Corridor, settings: BakeSettings) -> Plan:
         cells = len(cut(corridor, settings.cell_size))
     placement = settings.place()
     layers = len(placement.layers)
-    cost = {name: c.of(layers, settings.resolution, scene.triangles) for name, c in COSTS.items()}
+    cost = {
+        name: c.of(layers, settings.resolution, scene.triangles)
+        for name, c in COSTS[settings.quads].items()
+    }
     return Plan(
         cells=cells,
-        near_field=placement.near_field,
-        layers=layers,
-        megabytes=cells * (cost["bytes"] + cost["quads"] * QUAD_BYTES) / 1e6,
+        near_field=settings.near_field,
+        layers=layers if settings.quads == "layers" else 0,
+        megabytes=cells * (cost["bytes"] + cost["quads"] * QUAD_BYTES[settings.quads]) / 1e6,
         seconds=cells * cost["seconds"],
         quads=cost["quads"],
     )
