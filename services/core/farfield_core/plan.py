@@ -56,14 +56,14 @@ REFERENCE_LAYERS = 64
 REFERENCE_RESOLUTION = 512
 REFERENCE_TRIANGLES = 850_000
 
-#: One cell of the demo city, 14 m, 512 texels, by one process on a CPU without a GPU: means over two
-#: to twelve cells of its avenue, 64 layers, or slanted quads with the near field of 64 layers.
+#: One cell of the demo city, 14 m, 512 texels, 64 layers or slanted quads with the near field of 64
+#: layers: means over two to twelve cells of its avenue; seconds are processor time, without a GPU.
 #: Exponents: for layers from 16 and 200 layers (slanted: the near field that 200 layers have), for
 #: texels of layers from 256 and 1024. What slanted quads cost at other resolutions, and how seconds
 #: depend on anything, is that of a prototype.
 COSTS: dict[str, dict[str, _Cost]] = {
     "layers": {
-        "seconds": _Cost(value=1.5, layers=0.8, texels=0.8, triangles=0.5),
+        "seconds": _Cost(value=0.9, layers=0.8, texels=0.8, triangles=0.5),
         "bytes": _Cost(value=1.15e6, layers=0.9, texels=0.85, triangles=0.0),
         "quads": _Cost(value=20.1e3, layers=1.2, texels=0.8, triangles=0.0),
     },
