@@ -54,18 +54,19 @@ class _Cost(NamedTuple):
 
 REFERENCE_LAYERS = 64
 REFERENCE_RESOLUTION = 512
-REFERENCE_TRIANGLES = 877_000
+REFERENCE_TRIANGLES = 850_000
 
-#: One cell of a dense city, 877k triangles, 512 texels, 64 layers, four faces, two CPU cores.
-#: Exponents: layers from the same city at 328 layers, texels from 1024 texels, triangles from the
-#: floor of the culled draw loop.
+#: One cell of the demo city, 14 m, 512 texels, 64 layers, by one process on a CPU without a GPU:
+#: means over two to twelve cells of its avenue. Exponents of layers between 16 and 64 layers and
+#: (on a prototype) 328, those of texels between 256, 512 and 1024. How seconds depend on layers,
+#: texels and triangles is that of a prototype's renderer.
 COSTS = {
-    "seconds": _Cost(value=0.82, layers=0.8, texels=0.8, triangles=0.5),
-    "bytes": _Cost(value=779e3, layers=0.77, texels=1.5, triangles=0.0),
-    "quads": _Cost(value=18.0e3, layers=0.96, texels=1.0, triangles=0.0),
+    "seconds": _Cost(value=1.5, layers=0.8, texels=0.8, triangles=0.5),
+    "bytes": _Cost(value=1.15e6, layers=0.9, texels=0.85, triangles=0.0),
+    "quads": _Cost(value=20.1e3, layers=1.2, texels=0.8, triangles=0.0),
 }
-#: bytes of a quad in a cell's file, gzip left out
-QUAD_BYTES = 70.0
+#: bytes of a quad in a cell's file, before the server compresses it
+QUAD_BYTES = 106.0
 
 
 def plan(scene: SceneInfo, corridor: Corridor, settings: BakeSettings) -> Plan:
