@@ -42,7 +42,8 @@ FLAGS = [
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     """Chromium on the machine's own GL."""
-    path = os.environ.get("FARFIELD_CHROMIUM") or shutil.which("chromium")
+    path = os.environ.get("FARFIELD_CHROMIUM")
+    path = path or shutil.which("chromium") or shutil.which("google-chrome")
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=path, args=FLAGS)
         yield chromium
