@@ -1,8 +1,8 @@
 """Rectangle growth that tolerates holes: far fewer quads for a few transparent texels.
 
 Plain greedy growth (LEMI section 5) stops at the first texel that is not covered, so a sloping edge
-becomes a staircase of rectangles. Here a rectangle grows on all four sides, always by the strip that
-is fullest, as long as that strip is at least `STRIP` full and the rectangle at least `FULL`; what
+becomes a staircase of rectangles. Here a rectangle grows on all four sides, always by the fullest
+strip, as long as that strip is at least `STRIP` full and the rectangle at least `FULL`; what
 is transparent inside costs bytes that compress to nothing, while every quad costs a draw. Texels
 that another rectangle owns count as transparent.
 """

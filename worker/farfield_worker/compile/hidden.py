@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 from farfield_worker.compile import bitplanes
 from farfield_worker.compile.bitplanes import Planes
@@ -41,7 +42,7 @@ def reaches(
 ) -> list[tuple[int, int]]:
     """Whole texels (across, down) by which layer i and layer i + 1 may shift, for each i."""
     out = []
-    for far, near in zip(layers[:-1], layers[1:], strict=True):
+    for far, near in pairwise(layers):
         across, down = shift(far, near, half, resolution)
         # The placement makes the shift one texel up to rounding.
         out.append((math.ceil(across - 1e-6), math.ceil(down - 1e-6)))

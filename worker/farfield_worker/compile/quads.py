@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from farfield_core.walk import Quads
 from numpy.typing import NDArray
 
-from farfield_core.walk import Quads
 from farfield_worker.compile.pack import Places
 
 Ints = NDArray[np.int32]
