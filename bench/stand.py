@@ -20,9 +20,8 @@ from farfield_core.scenes import open_prepared
 from farfield_core.settings import BakeSettings
 from farfield_core.store import Store
 from farfield_core.walk import Walk
+from farfield_worker.demo import AVENUE
 
-ROOT = Path(__file__).parents[1]
-CORRIDORS = ROOT / "tests" / "corridors"
 RESULTS = Path(__file__).parent / "results"
 
 
@@ -45,7 +44,7 @@ def city(settings: BakeSettings, triangles: int = 850_000) -> Iterator[Stand]:
         write_city(model, triangles=triangles)
         store = Store.open(str(Path(folder) / "store"))
         info = prepared_scene(store, str(model))
-        walk = create_bake(store, info, read_corridor(CORRIDORS / "city.json"), settings)
+        walk = create_bake(store, info, read_corridor(AVENUE), settings)
         yield Stand(store, open_prepared(store, info.id), walk)
 
 

@@ -10,6 +10,8 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from farfield_worker.demo import AVENUE
+
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 DATA = Path(os.environ.get("FARFIELD_TEST_DATA", ROOT.parent / "shared" / "data"))
@@ -20,7 +22,7 @@ class Scene:
     """One scene and how to bake it.
 
     Attributes:
-        name: its corridor is `<name>.json` in this folder.
+        name: its corridor is `<name>.json` in this folder, that of the demo city its own.
         source: model file, relative to DATA; None for the demo city.
         cell_size: edge length of cells, in the scene's own units.
         first: the first cell's centre, to the scene's unit.
@@ -34,6 +36,8 @@ class Scene:
     @property
     def corridor(self) -> Path:
         """Its corridor file."""
+        if self.source is None:
+            return AVENUE
         return HERE / f"{self.name}.json"
 
     @property
