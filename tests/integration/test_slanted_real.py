@@ -17,7 +17,6 @@ RESOLUTION = 128
 pytestmark = [
     pytest.mark.data,
     pytest.mark.skipif(not DATA.is_dir(), reason=f"there are no real scenes in {DATA}"),
-    pytest.mark.usefixtures("graphics"),
 ]
 
 
