@@ -34,12 +34,12 @@ def two_cells(scene: Scene, folder: Path) -> Path:
     return file
 
 
-def command(scene: Scene, folder: Path) -> list[str]:
+def command(scene: Scene, folder: Path, quads: str = "layers") -> list[str]:
     corridor = two_cells(scene, folder)
     return [
         *(sys.executable, "-m", "farfield", "bake", str(scene.model)),
         *("--corridor", str(corridor), "--out", str(folder / "out")),
-        *("--cell-size", str(scene.cell_size), *SMALL),
+        *("--cell-size", str(scene.cell_size), "--quads", quads, *SMALL),
     ]
 
 
@@ -73,9 +73,10 @@ def check_store(folder: Path, figures: dict[str, Any]) -> None:
 @pytest.mark.data
 @needs_data
 @pytest.mark.parametrize("scene", [s for s in SCENES.values() if s.source], ids=lambda s: s.name)
-def test_a_real_scene(scene: Scene, tmp_path: Path) -> None:
+@pytest.mark.parametrize("quads", ["layers", "slanted"])
+def test_a_real_scene(scene: Scene, quads: str, tmp_path: Path) -> None:
     result = subprocess.run(
-        command(scene, tmp_path), capture_output=True, text=True, timeout=800, check=False
+        command(scene, tmp_path, quads), capture_output=True, text=True, timeout=800, check=False
     )
     assert result.returncode == 0, result.stderr
     figures = last_line(result.stdout)

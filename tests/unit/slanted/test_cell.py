@@ -9,10 +9,9 @@ from farfield_core.placement import default_alpha
 from farfield_core.scene import PreparedScene
 from farfield_worker.slanted.baker import SlantedBaker, SlantedCell, SlantedSettings
 from farfield_worker.slanted.painter import QuadPainter
-from farfield_worker.slanted.quads import limit_corners, texel_points, texel_uv
+from farfield_worker.slanted.quads import limit_corners
 from farfield_worker.slanted.residual import (
     CROWD,
-    EyeQuads,
     far_texels,
     residual_texels,
 )
@@ -22,6 +21,7 @@ from farfield_worker.visibility.depth_maps import DepthMap
 from numpy.typing import NDArray
 
 from tests.unit.scenes import SceneWriter, random_scene
+from tests.unit.slanted.promises import check_angles, check_order, check_tolerances
 
 Floats = NDArray[np.float64]
 RESOLUTION = 64
@@ -55,59 +55,12 @@ def baked(tmp_path_factory: pytest.TempPathFactory) -> tuple[PreparedScene, Slan
     return scene, cell
 
 
-def captured(part: EyeQuads) -> tuple[NDArray[np.int32], NDArray[np.bool_], Floats, Floats]:
-    """Texel, whether filled, true and drawn disparity of everything a part draws."""
-    texels, sheets = part.quads.texels, part.quads.sheets
-    sheet = np.repeat(np.arange(len(sheets.rect)), np.diff(texels.starts))
-    u, v = texel_uv(texels.texel, RESOLUTION)
-    a, b, c = sheets.plane[sheet].T
-    return texels.texel, texels.filled, part.quads.disparity[texels.fragment], a * u + b * v + c
-
-
-def test_texels_keep_their_tolerances(baked: tuple[PreparedScene, SlantedCell]) -> None:
+def test_promises(baked: tuple[PreparedScene, SlantedCell]) -> None:
     _, cell = baked
     assert {bool(part.eye.any()) for part in cell.parts} == {False, True}
-    for part in cell.parts:
-        _, filled, true, drawn = captured(part)
-        tolerance = Tolerance.of(
-            part.face, part.eye, HALF, SETTINGS.alpha, SETTINGS.near, SETTINGS.tolerance
-        )
-        for mask, times in ((~filled, 1.0), (filled, 2.0)):
-            low, high = tolerance.interval(true[mask], times)
-            assert np.all((low <= drawn[mask]) & (drawn[mask] <= high))
-
-
-def test_no_eye_sees_a_captured_point_off_by_more_than_alpha(
-    baked: tuple[PreparedScene, SlantedCell],
-) -> None:
-    _, cell = baked
-    steps = [np.linspace(-h, h, 5) for h in HALF]
-    eyes = np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 3)
-    for part in cell.parts:
-        texel, filled, true, drawn = captured(part)
-        keep = np.flatnonzero(~filled)[::7]
-        p = part.eye + texel_points(part.face, texel[keep], true[keep], RESOLUTION)
-        # drawn where it lies, or on the near border where the plane dips inside
-        ray = texel_points(part.face, texel[keep], np.ones(len(keep)), RESOLUTION)
-        walls = (SETTINGS.near - np.sign(ray) * part.eye) / np.maximum(np.abs(ray), 1e-12)
-        q = part.eye + ray * np.maximum(1 / drawn[keep], walls.min(axis=1))[:, None]
-        for eye in eyes:
-            across = np.linalg.norm(np.cross(p - eye, q - eye), axis=1)
-            angle = np.arctan2(across, np.einsum("ij,ij->i", p - eye, q - eye))
-            assert np.all(angle <= SETTINGS.alpha)
-
-
-def test_planes_are_ordered_like_fragments(baked: tuple[PreparedScene, SlantedCell]) -> None:
-    _, cell = baked
-    for part in cell.parts:
-        sheets = part.quads.sheets
-        own = np.flatnonzero(sheets.owner >= 0)
-        texel, owner = part.quads.texel[own], sheets.owner[own]
-        u, v = texel_uv(texel, RESOLUTION)
-        a, b, c = sheets.plane[owner].T
-        drawn = a * u + b * v + c
-        pairs = np.flatnonzero((np.diff(texel) == 0) & (np.diff(owner) != 0))
-        assert np.all(drawn[pairs] >= drawn[pairs + 1])
+    check_tolerances(cell, SETTINGS)
+    check_angles(cell, SETTINGS, every=7)
+    check_order(cell, SETTINGS)
 
 
 def test_quads_fit_the_format(baked: tuple[PreparedScene, SlantedCell]) -> None:

@@ -14,10 +14,11 @@ is left is dilated by one texel, which laps it over its surroundings.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from farfield_core.scene import PreparedScene
+from numba import njit
 from numpy.typing import NDArray
 
 from farfield_worker.slanted.fragments import Fragments
@@ -54,11 +55,12 @@ def residual_texels(
     `shown` (h, w) is the disparity drawn, 0 where nothing is; `far` says where the truth shows the
     far field.
     """
-    empty = (shown == 0) & (_least(truth.disparity) > 0)
     low = np.where(truth.disparity > 0, tolerance.interval(truth.disparity)[0], 0.0)
-    beyond = (shown > 0) & (shown < _least(low))
-    missing = far & (empty | beyond)
-    return _grow(missing & (_crowd(missing) >= CROWD))
+    missing = np.zeros(shown.shape, np.bool_)
+    _find(truth.disparity, low, shown, far, missing)
+    result = np.zeros(shown.shape, np.bool_)
+    _crowd(missing, result)
+    return result
 
 
 def residual_quads(
@@ -130,20 +132,33 @@ def map_fragments(truth: DepthMap, which: Mask) -> Fragments:
     )
 
 
-def _around(values: NDArray[np.generic]) -> list[NDArray[np.generic]]:
-    """The nine arrays of neighbours of `values` (h, w); edges are continued."""
-    grown = np.pad(values, 1, mode="edge")
-    h, w = values.shape
-    return [grown[i : i + h, j : j + w] for i in range(3) for j in range(3)]
+@njit(cache=True)
+def _find(true: Any, low: Any, shown: Any, far: Any, missing: Any) -> None:
+    """Mark far texels that show nothing amid geometry, or something beyond all that is true."""
+    height, width = true.shape
+    for y in range(height):
+        for x in range(width):
+            if not far[y, x] or (shown[y, x] >= low[y, x] and shown[y, x] > 0):
+                continue
+            amid, lowest = True, np.inf
+            for ny in range(max(y - 1, 0), min(y + 2, height)):
+                for nx in range(max(x - 1, 0), min(x + 2, width)):
+                    amid = amid and true[ny, nx] > 0
+                    lowest = min(lowest, low[ny, nx])
+            missing[y, x] = amid if shown[y, x] == 0 else shown[y, x] < lowest
 
 
-def _least(values: NDArray[np.floating]) -> NDArray[np.floating]:
-    return np.asarray(np.minimum.reduce(_around(values)))
-
-
-def _crowd(mask: Mask) -> NDArray[np.uint8]:
-    return np.asarray(np.add.reduce(_around(mask.astype(np.uint8))))
-
-
-def _grow(mask: Mask) -> Mask:
-    return np.asarray(np.logical_or.reduce(_around(mask)))
+@njit(cache=True)
+def _crowd(missing: Any, result: Any) -> None:
+    """Mark the 3 x 3 neighbourhoods of missing texels with at least CROWD around them."""
+    height, width = missing.shape
+    for y in range(height):
+        for x in range(width):
+            if not missing[y, x]:
+                continue
+            count = 0
+            for ny in range(y - 1, y + 2):
+                for nx in range(x - 1, x + 2):
+                    count += missing[min(max(ny, 0), height - 1), min(max(nx, 0), width - 1)]
+            if count >= CROWD:
+                result[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2] = True

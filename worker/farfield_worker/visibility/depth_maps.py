@@ -32,12 +32,13 @@ ROUNDS = (40_000, 120_000)
 
 _FRAGMENT = """
 uniform int first;
-layout(location = 0) out uvec4 nearest;
+layout(location = 0) out float disparity;
+layout(location = 1) out uvec2 surface_seen;
 
 void main() {
   vec3 color = surface(gl_FragCoord.xy);
-  nearest = uvec4(floatBitsToUint(gl_FragCoord.w), packUnorm4x8(vec4(color, 1.0)),
-    uint(first + gl_PrimitiveID), 0u);
+  disparity = gl_FragCoord.w;
+  surface_seen = uvec2(packUnorm4x8(vec4(color, 1.0)), uint(first + gl_PrimitiveID));
 }
 """
 
@@ -80,10 +81,10 @@ class DepthMapRenderer:
         self._clusters = clusters or Clusters(scene)
         with gl.current() as context:
             self.buffers = SceneBuffers(context, scene, VERTEX, _FRAGMENT)
-            self._texture = context.texture((resolution, resolution), 4, dtype="u4")
+            self._disparity = context.texture((resolution, resolution), 1, dtype="f4")
+            self._surface = context.texture((resolution, resolution), 2, dtype="u4")
             self._depth = gl.float_depth(context, (resolution, resolution))
-            self._framebuffer = context.framebuffer([self._texture], self._depth)
-            self._empty = bytes(16 * resolution * resolution)
+            self._framebuffer = context.framebuffer([self._disparity, self._surface], self._depth)
 
     def map(self, eye: Floats, face: int) -> DepthMap:
         """Depth map of `face` of `eye` (3,), scene coordinates."""
@@ -94,8 +95,8 @@ class DepthMapRenderer:
             self._framebuffer.use()
             context.enable_only(moderngl.DEPTH_TEST)
             context.front_face = "cw"
+            # this leaves integers undefined, so surfaces count only where there is a disparity
             self._framebuffer.clear(depth=0.0)
-            self._texture.write(self._empty)
             self.buffers.set(
                 eye=tuple((np.asarray(eye, np.float64) - self.scene.origin).astype(np.float32)),
                 right=tuple(right),
@@ -111,12 +112,15 @@ class DepthMapRenderer:
                 rest = rest.take(slice(some, None))
                 if len(rest.cluster) == 0:
                     break
-                rest = self._clusters.not_hidden(rest, self._read()[0].view(np.float32))
+                rest = self._clusters.not_hidden(rest, self._shown())
             ids.append(self._draw(context, rest, eye, face, sum(map(len, ids))))
-            disparity, color, drawn = self._read()[:3]
-        triangle = np.concatenate([*ids, [-1]]).astype(np.int32)
-        shown = disparity.view(np.float32)
-        return DepthMap(shown, color, triangle[np.where(shown > 0, drawn.view(np.int32), -1)])
+            disparity = self._shown()
+            data = np.frombuffer(self._surface.read(), np.uint32)
+        seen = disparity > 0
+        color, drawn = data.reshape(*disparity.shape, 2).transpose(2, 0, 1)
+        triangle = np.full(disparity.shape, -1, np.int32)
+        triangle[seen] = np.concatenate(ids)[drawn[seen]]
+        return DepthMap(disparity, np.where(seen, color, np.uint32(0)), triangle)
 
     def _draw(
         self, context: moderngl.Context, clusters: InView, eye: Floats, face: int, first: int
@@ -140,11 +144,10 @@ class DepthMapRenderer:
         indices.release()
         return triangles
 
-    def _read(self) -> NDArray[np.uint32]:
-        """The framebuffer as four pictures, (4, h, w) uint32."""
-        data = np.frombuffer(self._texture.read(), np.uint32)
-        planes = np.ascontiguousarray(data.reshape(-1, 4).T)
-        return planes.reshape(4, self.resolution, self.resolution)
+    def _shown(self) -> NDArray[np.float32]:
+        """Disparities drawn so far, (h, w) float32, 0 where nothing is."""
+        data = np.frombuffer(self._disparity.read(), np.float32)
+        return data.reshape(self.resolution, self.resolution)
 
     def close(self) -> None:
         """Free what the GPU holds."""
