@@ -6,8 +6,11 @@ import farfield_shading as shading
 import numpy as np
 import pytest
 from farfield_core.errors import BadInputError
+from farfield_worker.prepare import prepare
+from farfield_worker.shoot.command import shoot_to_file
 from farfield_worker.shoot.scene import SceneShooter
 from farfield_worker.shoot.view import NearField, View
+from PIL import Image
 
 from tests.unit.raycast import JITTER, cast, stable
 from tests.unit.scenes import SceneWriter
@@ -104,6 +107,21 @@ def test_without_a_near_field_nothing_is_far(tmp_path):
 def test_impossible_views_are_refused(options):
     with pytest.raises(BadInputError):
         View(**{"eye": (0.0, 0.0, 0.0), "yaw": 0.0, "pitch": 0.0, **options})
+
+
+def test_model_files_and_prepared_folders_are_shot_alike(tmp_path):
+    model = tmp_path / "roof.obj"
+    model.write_text("v -9 -4 -9\nv 9 -4 -9\nv 0 7 -12\nv 0 -4 -4\nf 1 2 3\nf 1 4 2\n")
+    view = View((0.0, 0.0, 0.0), 0.1, -0.2, 80.0, 32)
+    shoot_to_file(model, view, tmp_path / "model.png")
+    prepare(model, tmp_path / "prepared", "roof", "roof")
+    shoot_to_file(tmp_path / "prepared", view, tmp_path / "prepared.png")
+    pictures = []
+    for name in ("model.png", "prepared.png"):
+        with Image.open(tmp_path / name) as image:
+            pictures.append(np.asarray(image))
+    np.testing.assert_array_equal(*pictures)
+    assert set(np.unique(pictures[0][..., 3])) == {0, 255}
 
 
 def test_empty_direction_shows_only_sky(tmp_path: Path):

@@ -61,8 +61,8 @@ class SceneBuffers:
         """Set uniforms in all programs."""
         self._programs.set(**values)
 
-    def bind(self, batch: Batch) -> None:
-        """Set a batch's textures, uniforms and culling."""
+    def bind(self, batch: Batch, cull: bool = True) -> None:
+        """Set a batch's textures, uniforms and, if `cull`, whether back faces are dropped."""
         set_uniforms(
             self._programs.get(Features.of(batch)),
             emissive_factor=batch.emissive,
@@ -72,7 +72,7 @@ class SceneBuffers:
             self._textures[batch.texture].use(0)
         if batch.emissive_texture is not None:
             self._textures[batch.emissive_texture].use(1)
-        gl.cull_back_faces(self.context, not batch.double_sided)
+        gl.cull_back_faces(self.context, cull and not batch.double_sided)
 
     def release(self) -> None:
         """Free what the GPU holds."""

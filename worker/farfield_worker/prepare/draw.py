@@ -106,6 +106,8 @@ class Painter:
 
     def close(self) -> None:
         """Free the context."""
+        # What Python still holds dies with it; freed later, it would be freed in another context.
+        self._context.gc_mode = None
         self._context.release()
 
     def draw(self, camera: Camera, width: int, height: int, sky: bool) -> NDArray[np.uint8]:

@@ -1,4 +1,9 @@
-"""Layer borders as disparities: what the shader compares and what culling sorts by."""
+"""Layer borders as depths: what the shader compares, the depth buffer orders and culling sorts by.
+
+A surface at distance Z has window depth near / Z (see gl.context): 1 at the near clip plane, 0 at
+infinity. Layers are told apart by that very number, so nothing that belongs to one layer can ever
+hide, by rounding, behind what a farther layer has left in the depth buffer.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +21,10 @@ def near_clip(borders: Sequence[float]) -> np.float32:
     return np.float32(NEAR_CLIP * borders[-1])
 
 
-def layer_disparities(borders: Sequence[float]) -> NDArray[np.float32]:
-    """Disparities of the borders with infinity in front, (layers + 1,) float32, ascending.
+def border_depths(borders: Sequence[float]) -> NDArray[np.float32]:
+    """Depths of the borders with infinity in front, (layers + 1,) float32, ascending.
 
-    Layer i holds disparities d with result[i] < d <= result[i + 1].
+    Layer i holds depths z with result[i] < z <= result[i + 1].
     """
-    return np.concatenate([[0.0], 1.0 / np.asarray(borders, np.float64)]).astype(np.float32)
+    near = float(near_clip(borders))
+    return np.concatenate([[0.0], near / np.asarray(borders, np.float64)]).astype(np.float32)

@@ -2,7 +2,7 @@
 
 Layers are drawn far to near into one framebuffer that is cleared once per face. Anything a layer
 draws lies nearer than all that farther layers have left behind, so the depth test lets it through,
-and what was left behind is known by its disparity when the layer's rectangle is read back.
+and what was left behind is known by its depth when the layer's rectangle is read back.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from farfield_core.scene import PreparedScene
 from numpy.typing import NDArray
 
 from farfield_worker.gl import context as gl
-from farfield_worker.render.borders import layer_disparities, near_clip
+from farfield_worker.render.borders import border_depths, near_clip
 from farfield_worker.render.culling import Culler, Lists
 from farfield_worker.render.interface import FaceTexels
 from farfield_worker.render.target import FaceTarget
@@ -37,10 +37,8 @@ class CulledRenderer:
         self, eye: NDArray[np.float64], face: int, borders: Sequence[float], resolution: int
     ) -> FaceTexels:
         """See `Renderer.face`."""
-        disparities = layer_disparities(borders)
-        lists = self._culler.lists(
-            self._target.eye(eye), face, disparities, near_clip(borders), resolution
-        )
+        depths, near = border_depths(borders), near_clip(borders)
+        lists = self._culler.lists(self._target.eye(eye), face, depths, near, resolution)
         layers = []
         if len(lists.indices):
             with gl.current():
@@ -48,7 +46,7 @@ class CulledRenderer:
                 framebuffer = self._target.begin(eye, face, borders, resolution)
                 for layer in range(len(borders)):
                     if lists.rectangles[layer, 0] < lists.rectangles[layer, 2]:
-                        texels = self._layer(framebuffer, lists, layer, disparities)
+                        texels = self._layer(framebuffer, lists, layer, depths, near)
                         layers.append((layer, texels))
                 framebuffer.scissor = framebuffer.viewport
         return merge(layers, resolution)
@@ -58,16 +56,17 @@ class CulledRenderer:
         framebuffer: moderngl.Framebuffer,
         lists: Lists,
         layer: int,
-        disparities: NDArray[np.float32],
+        depths: NDArray[np.float32],
+        near: np.float32,
     ) -> LayerTexels:
         """Draw one layer and read back what it covers."""
         x0, y0, x1, y1 = (int(edge) for edge in lists.rectangles[layer])
         framebuffer.scissor = (x0, y0, x1 - x0, y1 - y0)
         buffers = self._target.buffers
-        buffers.set(layer=(float(disparities[layer]), float(disparities[layer + 1])))
+        buffers.set(layer=(float(depths[layer]), float(depths[layer + 1])))
         starts = lists.starts[layer]
         for number in np.flatnonzero(starts[1:] > starts[:-1]):
-            buffers.bind(buffers.batches[number])
+            buffers.bind(buffers.batches[number], cull=False)
             first, end = int(starts[number]), int(starts[number + 1])
             self._arrays[number].render(vertices=3 * (end - first), first=3 * first)
         pixels = self._readback[: 2 * (x1 - x0) * (y1 - y0)]
@@ -75,9 +74,8 @@ class CulledRenderer:
             self._readback = np.empty(2 * self._target.size**2, np.uint32)
             pixels = self._readback[: 2 * (x1 - x0) * (y1 - y0)]
         framebuffer.read_into(pixels, (x0, y0, x1 - x0, y1 - y0), components=2, dtype="u4")
-        return collect(
-            pixels.reshape(y1 - y0, x1 - x0, 2), x0, y0, self._target.size, disparities[layer]
-        )
+        rectangle = pixels.reshape(y1 - y0, x1 - x0, 2)
+        return collect(rectangle, x0, y0, self._target.size, depths[layer], near)
 
     def _upload(self, indices: NDArray[np.uint32]) -> None:
         """Put the index lists where the vertex arrays read them."""

@@ -73,14 +73,15 @@ class Culler:
         self,
         eye: NDArray[np.float32],
         face: int,
-        disparities: NDArray[np.float32],
+        depths: NDArray[np.float32],
         near: np.float32,
         resolution: int,
     ) -> Lists:
         """Lists for a face seen from `eye` (3,) float32, relative to the scene's origin.
 
-        `disparities` and `near`, the near clip plane, are those of `borders`.
+        `depths` of borders and `near`, the distance of the near clip plane, are those of `borders`.
         """
+        disparities = depths.astype(np.float64) / near
         blocks = self._visible_blocks(eye.astype(np.float64), face, float(near))
         parts = np.ascontiguousarray(self._parts[blocks[self._parts[:, 1]]])
         axes = np.stack([FACES[face].right, FACES[face].down, FACES[face].forward])

@@ -12,7 +12,7 @@ from farfield_core.scene import PreparedScene
 from numpy.typing import NDArray
 
 from farfield_worker.gl import context as gl
-from farfield_worker.render.borders import layer_disparities
+from farfield_worker.render.borders import border_depths, near_clip
 from farfield_worker.render.interface import FaceTexels
 from farfield_worker.render.target import FaceTarget
 from farfield_worker.render.texels import LayerTexels, merge
@@ -33,26 +33,25 @@ class PlainRenderer:
         self, eye: NDArray[np.float64], face: int, borders: Sequence[float], resolution: int
     ) -> FaceTexels:
         """See `Renderer.face`."""
-        disparities = layer_disparities(borders)
+        depths, near = border_depths(borders), near_clip(borders)
         layers = []
         with gl.current():
             framebuffer = self._target.begin(eye, face, borders, resolution)
             for layer in range(len(borders)):
                 self._target.clear()
-                self._draw(float(disparities[layer]), float(disparities[layer + 1]))
+                self._draw(float(depths[layer]), float(depths[layer + 1]))
                 data = framebuffer.read(components=2, dtype="u4")
                 color, bits = np.frombuffer(data, np.uint32).reshape(-1, 2).T
                 texel = np.flatnonzero(bits).astype(np.int32)
-                layers.append(
-                    (layer, LayerTexels(texel, color[texel], bits[texel].view(np.float32)))
-                )
+                distance = near / bits[texel].view(np.float32)
+                layers.append((layer, LayerTexels(texel, color[texel], distance)))
         return merge(layers, resolution)
 
     def _draw(self, least: float, greatest: float) -> None:
         buffers = self._target.buffers
         buffers.set(layer=(least, greatest))
         for number, batch in enumerate(buffers.batches):
-            buffers.bind(batch)
+            buffers.bind(batch, cull=False)
             for block in self._scene.info.blocks:
                 for part in block.parts:
                     if part.batch == number:

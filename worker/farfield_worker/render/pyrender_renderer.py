@@ -160,17 +160,19 @@ class _Drawer(PyrenderRendererBase):  # type: ignore[misc]
         super()._bind_and_draw_primitive(primitive, pose, program, flags)
 
     def _configure_main_framebuffer(self) -> None:
-        fresh = self._main_fb is None
+        size = (self.viewport_width, self.viewport_height)
+        fresh = self._main_fb_dims != size
         super()._configure_main_framebuffer()
         if fresh:
             # Four samples would blend texels with what lies behind them.
-            size = (self.viewport_width, self.viewport_height)
             for buffer, kind in (
                 (self._main_cb_ms, GL.GL_RGBA8),
                 (self._main_db_ms, GL.GL_DEPTH_COMPONENT24),
             ):
                 GL.glBindRenderbuffer(GL.GL_RENDERBUFFER, buffer)
                 GL.glRenderbufferStorage(GL.GL_RENDERBUFFER, kind, *size)
+            # Mesa asks again whether a framebuffer is complete only when another one was bound.
+            GL.glBindFramebuffer(GL.GL_DRAW_FRAMEBUFFER, self._main_fb)
 
     def __del__(self) -> None:
         """Do nothing: there may be no context any more; `close` frees everything."""
@@ -257,9 +259,7 @@ class PyrenderRenderer:
                 distance = depth.ravel()[texel]
                 # pyrender says 0 where the depth buffer holds its greatest value
                 distance[distance == 0.0] = near * 2.0**24 if far is None else far
-                layers.append(
-                    (layer, LayerTexels(texel, packed[texel], np.float32(1.0) / distance))
-                )
+                layers.append((layer, LayerTexels(texel, packed[texel], distance)))
         return merge(layers, resolution)
 
     def _open_drawer(self, resolution: int) -> _Drawer:

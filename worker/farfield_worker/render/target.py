@@ -28,25 +28,30 @@ vec4 clip_position(vec3 position) {
 }
 """
 
-#: gl_FragCoord.w is 1 / Z, the disparity; `layer` holds the layer's least (excluded) and greatest.
+#: `layer` holds the layer's least (excluded) and greatest depth, see `borders`.
 #: The tests follow all texture reads, whose derivatives need the neighbouring fragments.
+#: Back faces are dropped here and not by GL: Mesa culls by unrounded corners where a draw has to be
+#: clipped and by rounded ones where it has not, so a sliver would depend on what is drawn with it.
 FRAGMENT = """
 uniform vec2 layer;
 layout(location = 0) out uvec2 texel;
 
 void main() {
   vec3 color = surface(gl_FragCoord.xy);
-  float disparity = gl_FragCoord.w;
-  if (disparity <= layer.x || disparity > layer.y) discard;
-  texel = uvec2(packUnorm4x8(vec4(color, 1.0)), floatBitsToUint(disparity));
+  float depth = gl_FragCoord.z;
+  if (depth <= layer.x || depth > layer.y) discard;
+#ifndef DOUBLE_SIDED
+  if (!gl_FrontFacing) discard;
+#endif
+  texel = uvec2(packUnorm4x8(vec4(color, 1.0)), floatBitsToUint(depth));
 }
 """
 
 
 class FaceTarget:
-    """A scene on the GPU and a framebuffer of packed colours and disparities.
+    """A scene on the GPU and a framebuffer of packed colours and depths.
 
-    The framebuffer's texels are (RGBA8 as one uint32, float32 disparity's bits); zero is empty.
+    The framebuffer's texels are (RGBA8 as one uint32, float32 depth's bits); zero is empty.
     """
 
     def __init__(self, scene: PreparedScene) -> None:

@@ -14,12 +14,12 @@ from farfield_worker.render.interface import FaceTexels
 
 class LayerTexels(NamedTuple):
     """Covered texels of one layer: (n,) int32 texels, ascending; (n,) uint32 packed RGBA8;
-    (n,) float32 disparities.
+    (n,) float32 distances along the face's axis.
     """
 
     texel: NDArray[np.int32]
     color: NDArray[np.uint32]
-    disparity: NDArray[np.float32]
+    distance: NDArray[np.float32]
 
 
 @numba.njit(cache=True)
@@ -39,19 +39,25 @@ def _collect(
 
 
 def collect(
-    pixels: NDArray[np.uint32], column: int, row: int, resolution: int, least: np.float32
+    pixels: NDArray[np.uint32],
+    column: int,
+    row: int,
+    resolution: int,
+    least: np.float32,
+    near: np.float32,
 ) -> LayerTexels:
-    """Texels of a rectangle whose disparity exceeds `least`, the layer's far end.
+    """Texels of a rectangle whose depth exceeds `least`, the layer's far end.
 
-    `pixels` is (h, w, 2) uint32, a framebuffer's rectangle with its corner at (column, row); what
-    farther layers have left in it is not above `least`.
+    `pixels` is (h, w, 2) uint32, a rectangle of `target.FaceTarget` with its corner at
+    (column, row); what farther layers have left in it is not above `least`. `near` is the distance
+    of the near clip plane, which has depth 1.
     """
     area = pixels.shape[0] * pixels.shape[1]
     texel, bits = np.empty(area, np.int32), np.empty((area, 2), np.uint32)
     least_bits = int(least.view(np.uint32))
     count = _collect(pixels, column, row, resolution, least_bits, texel, bits)
-    color, disparity = bits[:count, 0].copy(), bits[:count, 1].copy().view(np.float32)
-    return LayerTexels(texel[:count].copy(), color, disparity)
+    color, depth = bits[:count, 0].copy(), bits[:count, 1].copy().view(np.float32)
+    return LayerTexels(texel[:count].copy(), color, near / depth)
 
 
 @numba.njit(cache=True)
@@ -62,7 +68,7 @@ def _scatter(
         at = start[part.texel[i]]
         start[part.texel[i]] += 1
         texel[at], layer[at], color[at] = part.texel[i], index, part.color[i]
-        depth[at] = np.float32(1.0) / part.disparity[i]
+        depth[at] = part.distance[i]
 
 
 def merge(layers: Sequence[tuple[int, LayerTexels]], resolution: int) -> FaceTexels:

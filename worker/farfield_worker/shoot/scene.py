@@ -100,8 +100,9 @@ class SceneShooter:
         """Blocks whose bounds reach into the picture's frustum, (blocks,) bool."""
         right, up, forward = view.axes()
         visible = np.ones(len(self._low), np.bool_)
+        widening = 1.0 + 2.0 * max(abs(n) for n in view.jitter) / view.size
         for side in (right, -right, up, -up):
-            plane = forward + view.focal * side
+            plane = widening * forward + view.focal * side
             reach = np.where(plane > 0, self._high, self._low) - eye
             # the shader works in float32
             visible &= reach @ plane >= -1e-5 * np.abs(reach).sum(axis=1) - 1e-3
