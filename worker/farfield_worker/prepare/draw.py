@@ -107,8 +107,11 @@ class Painter:
     def close(self) -> None:
         """Free the context."""
         # What Python still holds dies with it; freed later, it would be freed in another context.
-        self._context.gc_mode = None
-        self._context.release()
+        context: Any = (
+            self._context
+        )  # moderngl types the mode that ends collecting as a string only
+        context.gc_mode = None
+        context.release()
 
     def draw(self, camera: Camera, width: int, height: int, sky: bool) -> NDArray[np.uint8]:
         """(height, width, 4) uint8, sRGB; without `sky` the background is transparent."""
