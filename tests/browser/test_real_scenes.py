@@ -178,6 +178,7 @@ def test_the_picture_in_the_readme(tmp_path: Path, context: BrowserContext, page
     assert ground[0] >= ground[2], "the avenue is paved in a warm grey"
     assert len(np.unique(picture.reshape(-1, 3) // 16, axis=0)) > 150, "a city has many colours"
     if SOAK:
+        PICTURES.mkdir(exist_ok=True)
         (PICTURES / "walk.png").write_bytes(file.read_bytes())
 
 
