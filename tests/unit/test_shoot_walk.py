@@ -289,7 +289,7 @@ def test_paged_manifests_rank_cells_like_inline_ones(tmp_path):
         (lambda q: q.update(faces=[6]), "faces"),
         (lambda q: q.update(eyes=[1]), "eyes"),
         (lambda q: q.update(pages=[-1]), "pages"),
-        (lambda q: q.update(corner_counts=[2]), "corners"),
+        (lambda q: q.update(corner_counts=[2]), "corner"),
         (lambda q: q.update(planes=[0.0]), "planes"),
         (lambda q: q.update(scales=[]), "scales"),
     ],
@@ -327,7 +327,7 @@ def test_ranges_beyond_a_near_block_are_refused(tmp_path):
     triangle = np.array([[[-3, -3, -6], [3, -3, -6], [3, 3, -6]]], np.float64)
     for n, ranges in enumerate([(0, 0, 2), (0, -1, 1), (1, 0, 1)]):
         writer.near = [(near_glb(triangle), ranges)]
-        with pytest.raises(BadInputError, match="lists triangles"):
+        with pytest.raises(BadInputError, match=r"lists triangles|ranges"):
             shoot(writer, tmp_path / str(n), View(writer.centre(), 0.0, 0.0, size=4))
 
 

@@ -80,20 +80,24 @@ class WalkWriter:
         """Write the walk; returns its walk.json."""
         for name in ("cells", "atlases", "near"):
             (folder / name).mkdir(parents=True)
-        names = tuple(f"{n}.png" for n in range(len(self.pages)))
+        names = tuple(f"{n:032x}.png" for n in range(len(self.pages)))
         for name, pixels in zip(names, self.pages, strict=True):
             Image.fromarray(pixels).save(folder / "atlases" / name)
         for name, pixels in self.images.items():
             Image.fromarray(pixels).save(folder / "near" / name)
         for n, (data, _) in enumerate(self.near):
-            (folder / "near" / f"{n}.glb").write_bytes(data)
+            (folder / "near" / f"{n:032x}.glb").write_bytes(data)
         near = tuple(
-            NearBlock(blob=f"{n}.glb", ranges=ranges) for n, (_, ranges) in enumerate(self.near)
+            NearBlock.model_construct(blob=f"{n:032x}.glb", ranges=ranges)
+            for n, (_, ranges) in enumerate(self.near)
         )
-        cell = CellFile(
+        # unchecked, so that faults can be written too
+        cell = CellFile.model_construct(
             cell=(0, 0, 0),
             eyes=tuple(self.eyes),
-            quads=Quads(**{name: tuple(column) for name, column in self.quads.items()}),
+            quads=Quads.model_construct(
+                **{name: tuple(column) for name, column in self.quads.items()}
+            ),
             atlases=names,
             near=near,
             figures={},
