@@ -116,7 +116,8 @@ export class CellStreamer<V> {
 
   /**
    * Give up the least useful cell that matters less than `priority`, complete or loading; false if
-   * there is none. What is shown or wanted stays.
+   * there is none. What is wanted stays, and so does what is shown, unless the wanted cell itself
+   * finds no room beside it: a moment without a far field is better than the wrong one for ever.
    */
   evict(priority: number): boolean {
     let worst: Complete<V> | undefined;
@@ -132,10 +133,19 @@ export class CellStreamer<V> {
       this.drop(worst);
       return true;
     }
-    if (last === undefined || lastRank <= priority) return false;
+    if (last === undefined || lastRank <= priority) return priority === 0 && this.dropShown();
     this.loading.get(last)?.abort();
     this.loading.delete(last);
     this.full = Math.min(this.full, lastRank);
+    return true;
+  }
+
+  private dropShown(): boolean {
+    const name = this.shown?.name;
+    const complete = name === undefined ? undefined : this.complete.get(name);
+    if (complete === undefined || name === this.wanted?.name) return false;
+    this.drop(complete);
+    this.shown = undefined;
     return true;
   }
 
