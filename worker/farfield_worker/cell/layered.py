@@ -27,7 +27,7 @@ class LayeredImpostors:
     def __init__(self, scene: PreparedScene, walk: Walk, settings: BakeSettings) -> None:
         self.walk = walk
         self._faces = face_axes.SIDES if settings.faces == "sides" else face_axes.ALL
-        self._renderer: Renderer = open_renderer(settings.renderer, scene)
+        self._renderer: Renderer = open_renderer(settings.renderer, scene, settings.supersample)
         self.name = self._renderer.name
         self._half = np.array(walk.grid.size) / 2
         self._rules = Rules(
