@@ -56,12 +56,12 @@ def test_every_layer_of_the_plain_renderer_is_in_it(tmp_path: Path, seed: int) -
         first = np.unique(key, return_index=True)[1]
         want = layers.texel.astype(np.int64) * 100 + layers.layer
         assert np.array_equal(key[first], want)
-        # the near clip plane lies elsewhere, which rounds clipped triangles differently
+        # layers come from window depths and another near clip plane, so slivers round differently
         off = np.abs(1 / ours.disparity[first] / layers.depth - 1)
-        assert (off <= 1e-6).mean() > 0.95
+        assert (off <= 1e-5).mean() > 0.99
         assert np.all(off <= 1e-3)
         same = ours.color[first].view(np.uint8).reshape(-1, 4) == layers.color
-        assert same.all(axis=1).mean() > 0.98  # of two surfaces at one depth either may win
+        assert same.all(axis=1).mean() > 0.999  # of two surfaces at one depth either may win
     abuffer.close()
     plain.close()
 

@@ -44,6 +44,9 @@ uniform uint capacity;
 
 void main() {
   vec3 color = surface(gl_FragCoord.xy);
+#ifndef DOUBLE_SIDED
+  if (!gl_FrontFacing) discard; // not by GL, see render/target.py
+#endif
   vec3 w = vec3(2.0 * gl_FragCoord.xy / float(resolution) - 1.0, 1.0);
   float border = dot(walls[0], w);
   for (int i = 1; i < 5; i++) border = max(border, dot(walls[i], w));
@@ -162,7 +165,7 @@ class ABuffer:
     def _draw(self, array: moderngl.VertexArray, batch: int, first: int, count: int) -> int:
         """Draw `count` triangles of a batch from the `first`; return how many fragments."""
         self._count.write(bytes(16))
-        self.buffers.bind(self.buffers.batches[batch])
+        self.buffers.bind(self.buffers.batches[batch], cull=False)
         set_uniforms(array.program, first=first)
         array.render(vertices=3 * count, first=3 * first)
         self.buffers.context.memory_barrier()

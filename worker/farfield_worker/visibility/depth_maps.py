@@ -37,6 +37,9 @@ layout(location = 1) out uvec2 surface_seen;
 
 void main() {
   vec3 color = surface(gl_FragCoord.xy);
+#ifndef DOUBLE_SIDED
+  if (!gl_FrontFacing) discard; // not by GL, see render/target.py
+#endif
   disparity = gl_FragCoord.w;
   surface_seen = uvec2(packUnorm4x8(vec4(color, 1.0)), uint(first + gl_PrimitiveID));
 }
@@ -134,7 +137,7 @@ class DepthMapRenderer:
         indices = context.buffer(vertices)
         arrays = self.buffers.vertex_arrays(indices)
         for batch in np.flatnonzero(np.diff(starts)).tolist():
-            self.buffers.bind(self.buffers.batches[batch])
+            self.buffers.bind(self.buffers.batches[batch], cull=False)
             set_uniforms(arrays[batch].program, first=first + int(starts[batch]))
             arrays[batch].render(
                 vertices=3 * int(starts[batch + 1] - starts[batch]), first=3 * int(starts[batch])
