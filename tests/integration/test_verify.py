@@ -61,7 +61,8 @@ def test_every_figure_is_there(walk: Path, tmp_path: Path) -> None:
         assert part["pop"] is not None
         assert part["floor"]["pop"] == part["floor"]["flip"]
         assert part["fine"]["pixels"] > 2 * part["pixels"]
-    assert Image.open(tmp_path / "sheet.png").width == 3 * 320
+    with Image.open(tmp_path / "sheet.png") as sheet:
+        assert sheet.width == 3 * 320
 
 
 def test_the_same_views_give_the_same_figures(walk: Path) -> None:
