@@ -62,7 +62,9 @@ export class Session {
     this.walk.loaded.then(
       (manifest) => {
         const { start, grid } = manifest.walk;
-        this.walker.place(parsePose(location.hash) ?? start);
+        const asked = parsePose(location.hash);
+        this.walker.place(asked ?? start);
+        if (asked === undefined && !capture) this.walker.land();
         if (this.walk.index !== undefined && !capture) this.walker.enter(this.walk.index);
         this.camera.near = 0.01 * Math.min(...grid.size);
         this.resize();
@@ -98,7 +100,11 @@ export class Session {
   /** Move by an intent for some seconds, as controls do. */
   step(seconds: number, intent: Intent): void {
     const { index } = this.walk;
-    if (index !== undefined) this.walker.step(seconds, intent, index, this.brake);
+    if (index === undefined) return;
+    const { solid, topSpeed } = this.walk;
+    // Scripts and pictures go where they are told to, not where the ground is.
+    const around = this.capture ? {} : { solid, topSpeed };
+    this.walker.step(seconds, intent, { index, brake: this.brake, ...around });
   }
 
   /** Stream and draw one frame. */

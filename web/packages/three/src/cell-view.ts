@@ -1,6 +1,6 @@
 /** One complete cell as three.js objects: one mesh for all far quads, one per near draw state. */
 
-import type { BuiltCell, NearBatch } from '@farfield/core';
+import type { BuiltCell, NearBatch, Solid } from '@farfield/core';
 import {
   BufferAttribute,
   BufferGeometry,
@@ -18,6 +18,8 @@ export class CellView {
   readonly near: readonly WalkMesh[];
   readonly quads: number;
   readonly nearTriangles: number;
+  /** What a walker in the cell stands on and bumps into. */
+  readonly solid: Solid;
   /** Bytes of all vertex and index buffers. */
   readonly bytes: number;
   private readonly release: () => void;
@@ -25,6 +27,7 @@ export class CellView {
   /**
    * @param slots slot in the page pool of each of the cell's pages
    * @param nearMaterials a material for each batch
+   * @param solid the near field as obstacles
    * @param release called once, when the view is disposed of
    */
   constructor(
@@ -33,9 +36,11 @@ export class CellView {
     farMaterial: RawShaderMaterial,
     batches: readonly NearBatch[],
     nearMaterials: readonly RawShaderMaterial[],
+    solid: Solid,
     release: () => void,
   ) {
     this.release = release;
+    this.solid = solid;
     this.quads = cell.far.quads;
     this.group.name = 'farfield cell';
     this.group.position.set(...cell.centre);

@@ -12,6 +12,7 @@ import {
   type CellBuilder,
   type CellTable,
   type Manifest,
+  type Solid,
   type Vec3,
 } from '@farfield/core';
 import {
@@ -62,6 +63,8 @@ export interface WalkEvents {
 }
 
 const MEGABYTE = 2 ** 20;
+/** Cells ahead of a walker that prefetching counts on. */
+const LEAD = 1.5;
 
 export class Walk extends EventDispatcher<WalkEvents> {
   /** Add this to your scene. It may be moved and turned. */
@@ -147,6 +150,18 @@ export class Walk extends EventDispatcher<WalkEvents> {
   /** The cell that is shown. */
   get cell(): Cell | undefined {
     return this.shown;
+  }
+
+  /** What a walker in the shown cell stands on and bumps into. */
+  get solid(): Solid | undefined {
+    return this.view?.solid;
+  }
+
+  /** Metres a second at which cells still arrive in time, from how long they took to load lately. */
+  get topSpeed(): number {
+    const { index, loadSeconds } = this;
+    if (index === undefined || loadSeconds === 0) return Infinity;
+    return (LEAD * index.cellSize) / loadSeconds;
   }
 
   /** The cell that should be shown, and what has become of it. */

@@ -1,4 +1,4 @@
-import { InlineBuilder, UploadScheduler, type NearState } from '@farfield/core';
+import { InlineBuilder, Solid, UploadScheduler, buildSolid, type NearState } from '@farfield/core';
 import {
   BufferAttribute,
   BufferGeometry,
@@ -22,6 +22,7 @@ import { NearMaterials } from '../src/near-materials.js';
 import { LIGHT_GLSL } from '../src/shading.generated.js';
 import { setInfiniteFar } from '../src/index.js';
 
+const EMPTY = new Solid(buildSolid([], [1, 2, 3], [8, 8, 8]));
 const LIGHT = {
   ambient: [0.1, 0.1, 0.1],
   sun_direction: [0, 1, 0],
@@ -142,7 +143,7 @@ describe('CellView', () => {
     const built = await new InlineBuilder().cell(bytes, 64);
     let released = 0;
     const material = createFarMaterial({} as never);
-    const view = new CellView(built, [7, 3], material, [], [], () => released++);
+    const view = new CellView(built, [7, 3], material, [], [], EMPTY, () => released++);
     const slots = [...(view.far?.geometry.attributes.texel.array ?? [])].filter(
       (_, n) => n % 3 === 2,
     );
