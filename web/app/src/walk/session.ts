@@ -3,6 +3,7 @@
 import { cellDistance, type Vec3 } from '@farfield/core';
 import { Walk, setInfiniteFar } from '@farfield/three';
 import { PerspectiveCamera, Scene, WebGLRenderer } from 'three';
+import { Comparison } from './comparison.js';
 import { formatPose, parsePose, type Pose } from './address.js';
 import { Controls } from './controls.js';
 import { STILL, Walker, type Intent } from './walker.js';
@@ -24,6 +25,7 @@ export class Session {
   readonly walk: Walk;
   readonly walker = new Walker();
   readonly controls: Controls;
+  readonly comparison: Comparison;
   /** Milliseconds of the last frames, newest last. */
   readonly frameTimes: number[] = [];
   /** Called after every drawn frame. */
@@ -57,6 +59,7 @@ export class Session {
     });
     this.scene.add(this.walk.group);
     this.walk.setCamera(this.camera);
+    this.comparison = new Comparison(this.renderer, this.scene, this.walk);
     this.controls = new Controls(canvas);
     this.walker.direct = capture || window.matchMedia('(prefers-reduced-motion: reduce)').matches;
     this.walk.loaded.then(
@@ -112,8 +115,7 @@ export class Session {
     const { eye, yaw, pitch } = this.walker;
     this.camera.position.set(...eye);
     this.camera.rotation.set(pitch, yaw, 0);
-    this.walk.update();
-    this.renderer.render(this.scene, this.camera);
+    this.comparison.draw(this.camera);
     this.onFrame();
   }
 
@@ -121,6 +123,7 @@ export class Session {
     this.stop();
     window.removeEventListener('hashchange', this.onHash);
     this.controls.dispose();
+    this.comparison.dispose();
     this.walk.dispose();
     this.renderer.dispose();
   }

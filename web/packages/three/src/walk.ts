@@ -76,6 +76,8 @@ export class Walk extends EventDispatcher<WalkEvents> {
   index: CellIndex | undefined;
   /** Keep the shown cell while the camera moves on. */
   frozen = false;
+  /** Draw cells; the sky is drawn without them too. */
+  visible = true;
   private readonly options: WalkOptions;
   private readonly queue: FetchQueue;
   private readonly builder: CellBuilder;
@@ -125,7 +127,6 @@ export class Walk extends EventDispatcher<WalkEvents> {
       const { shown } = stage.streamer;
       if (view !== undefined && view !== this.view) {
         if (this.view !== undefined) this.view.group.visible = false;
-        view.group.visible = true;
         this.view = view;
         if (shown !== undefined && shown.name !== this.shown?.name) {
           this.shown = shown;
@@ -133,8 +134,14 @@ export class Walk extends EventDispatcher<WalkEvents> {
         }
       }
     }
+    this.showCells();
     stage.uploads.frame(this.options.uploadBytes ?? MEGABYTE);
     stage.attributes.update();
+  }
+
+  /** Make a change of `visible` count before the next `update`. */
+  showCells(): void {
+    if (this.view !== undefined) this.view.group.visible = this.visible;
   }
 
   /** Whether the camera's own cell is complete and shown. */
