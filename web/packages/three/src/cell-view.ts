@@ -45,7 +45,10 @@ export class CellView {
     this.group.name = 'farfield cell';
     this.group.position.set(...cell.centre);
     this.group.visible = false;
-    this.near = batches.map((batch, n) => mesh(nearGeometry(batch), nearMaterials[n], 0));
+    // In the order of the batches, nearest first, whatever their materials.
+    this.near = batches.map((batch, n) =>
+      mesh(nearGeometry(batch), nearMaterials[n], n / batches.length),
+    );
     this.far = this.quads === 0 ? undefined : mesh(farGeometry(cell, slots), farMaterial, 1);
     for (const object of this.near) this.group.add(object);
     if (this.far !== undefined) this.group.add(this.far);
