@@ -2,7 +2,13 @@ import { CellIndex, Solid, buildSolid, type NearBatch, type Vec3 } from '@farfie
 import fc from 'fast-check';
 import { describe, expect, test } from 'vitest';
 import { readBakes } from '../src/landing/bakes.js';
-import { formatPose, isCapture, manifestUrl, parsePose } from '../src/walk/address.js';
+import {
+  formatPose,
+  isCapture,
+  manifestUrl,
+  parsePose,
+  textureMemory,
+} from '../src/walk/address.js';
 import { explain } from '../src/walk/state.js';
 import { STILL, Walker, walkingSpeed } from '../src/walk/walker.js';
 
@@ -38,6 +44,15 @@ describe('addresses', () => {
       expect(parsePose(hash)).toBeUndefined();
     },
   );
+
+  test.each([
+    ['?memory=64', 64],
+    ['?memory=0.1', undefined],
+    ['?memory=lots', undefined],
+    ['', undefined],
+  ])('%s asks for so much texture memory', (query, megabytes) => {
+    expect(textureMemory(new URL(`http://h/walk/a${query}`))).toBe(megabytes);
+  });
 
   test('capture is asked for', () => {
     expect(isCapture(new URL('http://h/walk/a?capture'))).toBe(true);

@@ -2,7 +2,7 @@
 
 import { render } from 'preact';
 import '../styles.css';
-import { isCapture, manifestUrl } from './address.js';
+import { isCapture, manifestUrl, textureMemory } from './address.js';
 import { createHooks, type Hooks } from './capture.js';
 import { Session } from './session.js';
 import { explain } from './state.js';
@@ -49,7 +49,7 @@ function open(ui: HTMLElement, canvas: HTMLCanvasElement): void {
     canvas,
     manifestUrl: url,
     capture,
-    textureBytes: textureMegabytes() * 2 ** 20,
+    textureBytes: (textureMemory(page) ?? textureMegabytes()) * 2 ** 20,
   });
   window.farfield = createHooks(session);
   window.farfield.ready.catch(() => undefined);

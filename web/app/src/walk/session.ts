@@ -145,7 +145,7 @@ export class Session {
   }
 
   /** How freely a step may be taken: less the farther it leads from the cell that is shown. */
-  private readonly brake = (to: Vec3): number => {
+  readonly brake = (to: Vec3): number => {
     const { cell, index } = this.walk;
     if (cell === undefined || index === undefined) return 0;
     const before = cellDistance(cell, this.walker.eye);
