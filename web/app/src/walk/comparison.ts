@@ -73,13 +73,15 @@ export class Comparison {
     }
   }
 
-  draw(camera: Camera): void {
+  /** Draw a frame; `beside` is called once the walk is up to date. */
+  draw(camera: Camera, beside: () => void): void {
     const { model, renderer, walk } = this;
     const mode = this.state === 'ready' ? this.mode : 'walk';
     if (mode !== 'split' || model === undefined) {
       walk.visible = mode === 'walk';
       if (model !== undefined) model.group.visible = mode === 'full';
       walk.update();
+      beside();
       renderer.render(this.scene, camera);
       return;
     }
@@ -90,11 +92,13 @@ export class Comparison {
     walk.visible = true;
     model.group.visible = false;
     walk.update();
+    beside();
     renderer.render(this.scene, camera);
     renderer.setScissor(at, 0, width - at, height);
     walk.visible = false;
     model.group.visible = true;
     walk.showCells();
+    beside();
     renderer.render(this.scene, camera);
     renderer.setScissorTest(false);
   }

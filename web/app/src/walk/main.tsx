@@ -1,9 +1,11 @@
 /** The walk page. */
 
+import { FarfieldError, asError } from '@farfield/core';
 import { render } from 'preact';
 import '../styles.css';
-import { isCapture, manifestUrl, textureMemory } from './address.js';
+import { isCapture, manifestUrl, pathUrl, textureMemory } from './address.js';
 import { createHooks, type Hooks } from './capture.js';
+import { parsePath, type PathFile } from './path.js';
 import { Session } from './session.js';
 import { explain } from './state.js';
 import { Interface, Problem } from './ui.js';
@@ -28,6 +30,12 @@ function textureMegabytes(): number {
   const memory = 'deviceMemory' in navigator ? Number(navigator.deviceMemory) : 8;
   const coarse = window.matchMedia('(pointer: coarse)').matches;
   return memory <= 4 || coarse ? 128 : 256;
+}
+
+async function playable(url: string): Promise<PathFile> {
+  const response = await fetch(url);
+  if (!response.ok) throw new FarfieldError('format', `There is no path to play at ${url}.`);
+  return parsePath(await response.text());
 }
 
 function open(ui: HTMLElement, canvas: HTMLCanvasElement): void {
@@ -66,6 +74,18 @@ function open(ui: HTMLElement, canvas: HTMLCanvasElement): void {
   session.walk.addEventListener('context-restored', () => {
     delete document.body.dataset.lost;
   });
+  const path = pathUrl(page);
+  if (path !== undefined) {
+    Promise.all([playable(path), window.farfield.ready]).then(
+      ([file]) => session.play(file),
+      (error: unknown) => {
+        if (session.walk.manifest !== undefined) {
+          const { title, text } = explain(asError(error));
+          fail(title, text);
+        }
+      },
+    );
+  }
   if (!capture) render(<Interface session={session} />, ui);
 }
 

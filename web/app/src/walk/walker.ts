@@ -27,7 +27,7 @@ export interface World {
 export const STILL: Intent = { right: 0, forward: 0, up: 0, yaw: 0, pitch: 0, fast: false };
 
 /** A person: eye above the ground, half width, the highest step, metres. */
-const EYE = 1.7;
+export const EYE = 1.7;
 const RADIUS = 0.3;
 const STEP = 0.55;
 const STEEPEST = Math.PI / 2 - 0.01;

@@ -1,6 +1,6 @@
 /** One complete cell as three.js objects: one mesh for all far quads, one per near draw state. */
 
-import type { BuiltCell, NearBatch, Solid } from '@farfield/core';
+import { PAGES, type BuiltCell, type NearBatch, type Solid } from '@farfield/core';
 import {
   BufferAttribute,
   BufferGeometry,
@@ -86,7 +86,10 @@ function mesh(geometry: BufferGeometry, material: RawShaderMaterial, order: numb
 
 function farGeometry({ far }: BuiltCell, slots: readonly number[]): BufferGeometry {
   const { texels } = far;
-  for (let n = 2; n < texels.length; n += 3) texels[n] = slots[texels[n]];
+  for (let n = 2; n < texels.length; n += 3) {
+    const page = texels[n] % PAGES;
+    texels[n] += slots[page] - page;
+  }
   const geometry = new BufferGeometry();
   geometry.setAttribute('position', new BufferAttribute(far.positions, 4));
   geometry.setAttribute('texel', new BufferAttribute(texels, 3));

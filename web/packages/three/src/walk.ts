@@ -86,7 +86,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
   private readonly alpha: IUniform<number>;
   private stage: Stage | undefined;
   private camera: Camera | undefined;
-  private view: CellView | undefined;
+  private shownView: CellView | undefined;
   private shown: Cell | undefined;
   private ensuredAt: Vec3 | undefined;
   private loadSeconds = 0;
@@ -125,9 +125,9 @@ export class Walk extends EventDispatcher<WalkEvents> {
     if (!this.frozen) {
       const view = stage.streamer.update(motion);
       const { shown } = stage.streamer;
-      if (view !== undefined && view !== this.view) {
-        if (this.view !== undefined) this.view.group.visible = false;
-        this.view = view;
+      if (view !== undefined && view !== this.shownView) {
+        if (this.shownView !== undefined) this.shownView.group.visible = false;
+        this.shownView = view;
         if (shown !== undefined && shown.name !== this.shown?.name) {
           this.shown = shown;
           this.dispatchEvent({ type: 'cell-change', cell: shown });
@@ -141,7 +141,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
 
   /** Make a change of `visible` count before the next `update`. */
   showCells(): void {
-    if (this.view !== undefined) this.view.group.visible = this.visible;
+    if (this.shownView !== undefined) this.shownView.group.visible = this.visible;
   }
 
   /** Whether the camera's own cell is complete and shown. */
@@ -159,9 +159,14 @@ export class Walk extends EventDispatcher<WalkEvents> {
     return this.shown;
   }
 
+  /** The shown cell's meshes. */
+  get view(): CellView | undefined {
+    return this.shownView;
+  }
+
   /** What a walker in the shown cell stands on and bumps into. */
   get solid(): Solid | undefined {
-    return this.view?.solid;
+    return this.shownView?.solid;
   }
 
   /** Metres a second at which cells still arrive in time, from how long they took to load lately. */
@@ -189,7 +194,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
   get stats(): WalkStats {
     return readStats({
       stage: this.stage,
-      view: this.view,
+      view: this.shownView,
       cell: this.shown,
       queue: this.queue,
       loadSeconds: this.loadSeconds,
@@ -284,7 +289,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
     // Everything on the graphics card is gone, and can only be let go of before a new context comes.
     this.stage?.dispose();
     this.stage = undefined;
-    this.view = undefined;
+    this.shownView = undefined;
     this.shown = undefined;
     this.dispatchEvent({ type: 'context-lost' });
   };
