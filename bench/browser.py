@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +51,35 @@ def served(store: Path) -> Iterator[str]:
     settings = ApiSettings.from_environment(os.environ, store=str(store), jobs=1)
     with server.beside(create_app(settings)):
         yield server.address
+
+
+class Meter:
+    """Processor time of this browser's graphics process and of its pages' main threads."""
+
+    def __init__(self) -> None:
+        parents: dict[int, int] = {}
+        for stat in Path("/proc").glob("[0-9]*/stat"):
+            with suppress(OSError):
+                parents[int(stat.parent.name)] = int(stat.read_text().rpartition(")")[2].split()[1])
+        ours = {os.getpid()}
+        while more := {pid for pid, parent in parents.items() if parent in ours} - ours:
+            ours |= more
+        self._files: list[Path] = []
+        for pid in ours:
+            with suppress(OSError):
+                command = Path(f"/proc/{pid}/cmdline").read_text()
+                if "--type=gpu-process" in command:
+                    self._files += Path(f"/proc/{pid}/task").glob("*/schedstat")
+                elif "--type=renderer" in command:
+                    self._files.append(Path(f"/proc/{pid}/task/{pid}/schedstat"))
+
+    def milliseconds(self) -> float:
+        """Time spent up to now."""
+        spent = 0
+        for file in self._files:
+            with suppress(OSError):
+                spent += int(file.read_text().split()[0])
+        return spent / 1e6
 
 
 def bake(model: Path, corridor: dict[str, Any], out: Path, *options: str) -> str:

@@ -53,8 +53,8 @@ function Overlaid({ session }: { session: Session }): JSX.Element {
   const choices: [string, boolean, (on: boolean) => void][] = [
     [layered ? 'Layers' : 'Quads', overlays.tint, (on) => (overlays.tint = on)],
     ['Outlines', overlays.outlines, (on) => (overlays.outlines = on)],
-    ['Near border', overlays.border, (on) => (overlays.border = on)],
-    ['Freeze cell', walk.frozen, (on) => (walk.frozen = on)],
+    ['Border', overlays.border, (on) => (overlays.border = on)],
+    ['Freeze', walk.frozen, (on) => (walk.frozen = on)],
   ];
   return (
     <fieldset class="choices">
