@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from farfield_core import layout
 from farfield_core.corridor import Corridor, cut
 from farfield_core.settings import BakeSettings
-from fastapi import APIRouter, Body
+from fastapi import APIRouter, Body, Request
+from fastapi.responses import Response
 
+from farfield_api import immutable
 from farfield_api.dependencies import Service
 from farfield_api.exceptions import problems
-from farfield_api.names import SceneId
+from farfield_api.names import PreparedName, SceneId
 from farfield_api.scenes import Described
 from farfield_api.schemas import BOX, PATH, NewCorridor, SceneBody, SceneList
 
@@ -42,6 +45,16 @@ def scenes(service: Service) -> SceneList:
 def scene(service: Service, scene: SceneId) -> SceneBody:
     """Get a scene, and how far it has come."""
     return _body(service.scenes.describe(scene))
+
+
+@router.head("/{scene}/prepared/{file:path}", include_in_schema=False)
+@router.get("/{scene}/prepared/{file:path}", response_class=Response, responses=problems(404, 422))
+def prepared(request: Request, service: Service, scene: SceneId, file: PreparedName) -> Response:
+    """Get a file of the prepared scene: the model itself, or a picture of it."""
+    service.ready_scene(scene)
+    return immutable.stored(
+        request, service.store, layout.prepared_prefix(scene) + file, f"{scene}-{file}"
+    )
 
 
 @router.post("/{scene}/corridors", status_code=201, responses=problems(404, 409, 422))

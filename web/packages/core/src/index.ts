@@ -17,4 +17,5 @@ export * from './near-material.js';
 export * from './prefetch.js';
 export * from './quads.js';
 export * from './shared-store.js';
+export * from './solid.js';
 export * from './upload-scheduler.js';
