@@ -148,7 +148,7 @@ def witnessed(scene: PreparedScene, walk: Walk, centre: NDArray[np.float64], eye
     from farfield_worker.visibility.near_maps import NearMapRenderer  # noqa: PLC0415
 
     renderer = NearMapRenderer(scene, 2 * walk.resolution)
-    renderer.enter(centre, walk.near_field)
+    renderer.enter(centre, walk.near_drawn)
     half = np.array(walk.grid.size) / 2
     rng = np.random.default_rng(1000)
     seen = np.zeros(scene.info.triangles + 1, np.bool_)

@@ -72,10 +72,10 @@ class CellBaker:
         """Bake the cell `index` around `centre` (3,) and write its files, the cell's own last."""
         watch = Stopwatch()
         with watch("near"):
-            inside = near_triangles(self._scene, centre, self.walk.near_field)
+            inside = near_triangles(self._scene, centre, self.walk.near_drawn)
         shown, look, eyes = inside, None, 0
         if self._maps is not None:
-            near = NearTriangles(self._scene, inside, centre, self.walk.near_field)
+            near = NearTriangles(self._scene, inside, centre, self.walk.near_drawn)
 
             def look(watchers: Sequence[Watcher]) -> None:
                 nonlocal eyes
@@ -124,7 +124,7 @@ class CellBaker:
             self._maps,
             centre,
             np.array(self.walk.grid.size) / 2,
-            self.walk.near_field,
+            self.walk.near_drawn,
             EFFORTS[self.settings.visibility],
             watchers,
         )

@@ -51,10 +51,7 @@ class SlantedImpostors:
         self, centre: NDArray[np.float64], watch: Stopwatch, look: Look | None = None
     ) -> Impostors:
         """Impostors of the cell around `centre` (3,), scene coordinates."""
-        if look is not None:
-            with watch("visibility"):
-                look([])
-        cell = self._baker.cell(centre, self._settings, watch)
+        cell = self._baker.cell(centre, self._settings, watch, look)
         with watch("compile"):
             size = (self.walk.atlas.width, self.walk.atlas.height)
             images = [image for part in cell.parts for image in part.quads.images]
