@@ -5,7 +5,7 @@ import pytest
 from farfield_core import faces as face_axes
 from farfield_core import placement
 from farfield_worker.compile.atlas import lay_out
-from farfield_worker.compile.layered import Rules, compile_face
+from farfield_worker.compile.layered import Rules, cut, shown_texels
 from farfield_worker.compile.quads import layer_quads
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -20,7 +20,9 @@ def compiled(seed, resolution, layers, grower, largest, numbers):
         placement.place(HALF, max(resolution, 16), layers).layers, resolution, 8, grower, largest
     )
     return rules.layers, {
-        number: compile_face(random_face(seed + number, resolution, layers + 1), rules, HALF)
+        number: cut(
+            shown_texels(random_face(seed + number, resolution, layers + 1), rules, HALF), rules
+        )
         for number in numbers
     }
 
@@ -110,7 +112,7 @@ def test_compile_face_keeps_what_was_rendered_in_front(grower):
     for seed in range(20):
         face = random_face(seed, resolution, 5)
         rules = Rules(placement.place(HALF, 70, 4).layers, resolution, 8, grower, 1000)
-        out = compile_face(face, rules, HALF)
+        out = cut(shown_texels(face, rules, HALF), rules)
         layer = out.boxes[out.owner, 0]
         assert (np.diff(layer.astype(np.int64) * resolution**2 + out.texel) > 0).all()
         assert out.rendered == int((face.layer < 4).sum())

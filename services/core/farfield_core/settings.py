@@ -52,8 +52,10 @@ class BakeSettings(BaseModel):
     grower: Literal["greedy", "best"] = Field(
         default="best", description="how texels are gathered into quads"
     )
-    visibility: Literal["on", "off"] = Field(
-        default="on", description="leave out what no eye in the cell can see"
+    visibility: Literal["on", "off", "fast", "careful"] = Field(
+        default="on",
+        description="leave out what no eye in the cell can see; fast and careful sample fewer and "
+        "more eyes",
     )
     encoder: Literal["png", "webp"] = Field(default="png", description="format of atlas pages")
     supersample: int = Field(

@@ -37,6 +37,34 @@ class Rules(NamedTuple):
     largest: int
 
 
+class ShownFace(NamedTuple):
+    """Texels of one face that are worth storing.
+
+    Attributes:
+        texel: (n,) int32, row * resolution + column, in order of (layer, texel).
+        layer: (n,) int16.
+        color: (n,) uint32, little-endian RGBA.
+        filled: (n,) bool, put there by gap filling.
+        rendered: texels before anything was filled or removed.
+    """
+
+    texel: NDArray[np.int32]
+    layer: NDArray[np.int16]
+    color: NDArray[np.uint32]
+    filled: NDArray[np.bool_]
+    rendered: int
+
+    def take(self, which: NDArray[np.bool_]) -> ShownFace:
+        """Those of a mask (n,)."""
+        return ShownFace(
+            self.texel[which],
+            self.layer[which],
+            self.color[which],
+            self.filled[which],
+            self.rendered,
+        )
+
+
 class CompiledFace(NamedTuple):
     """Texels of one face and the rectangles they are in.
 
@@ -57,12 +85,11 @@ class CompiledFace(NamedTuple):
     filled: int
 
 
-def compile_face(
-    texels: FaceTexels, rules: Rules, half: tuple[float, float, float]
-) -> CompiledFace:
-    """Compile a face of a cell with `half` extents in the face's axes (right, down, forward).
+def shown_texels(texels: FaceTexels, rules: Rules, half: tuple[float, float, float]) -> ShownFace:
+    """Fill gaps and remove hidden texels of a face of a cell.
 
-    `texels` may go on beyond the last layer, into the near field (`gaps`).
+    `half` are the cell's half extents in the face's axes (right, down, forward). `texels` may go
+    on beyond the last layer, into the near field (`gaps`).
     """
     count, resolution = len(rules.layers), rules.resolution
     shifts = reaches(rules.layers, half, resolution)
@@ -76,18 +103,29 @@ def compile_face(
     shown = covered & ~hidden(covered, shifts)
     texel, layer = bitplanes.listed(shown)
     color = texels.color.view(np.uint32).reshape(-1)[sources(starts, texels.layer, texel, layer)]
-    owner = np.empty(len(texel), np.int32)
-    boxes = np.empty((len(texel), 5), np.int32)
+    return ShownFace(
+        texel,
+        layer,
+        color,
+        bitplanes.get(filled, texel, layer),
+        int(own.sum()),
+    )
+
+
+def cut(shown: ShownFace, rules: Rules) -> CompiledFace:
+    """Cut the texels of a face into rectangles."""
+    owner = np.empty(len(shown.texel), np.int32)
+    boxes = np.empty((len(shown.texel), 5), np.int32)
     boxes_made = GROWERS[rules.grower](
-        texel, layer, resolution, rules.largest, rules.largest, owner, boxes
+        shown.texel, shown.layer, rules.resolution, rules.largest, rules.largest, owner, boxes
     )
     return CompiledFace(
-        texel,
-        color,
+        shown.texel,
+        shown.color,
         owner,
         boxes[:boxes_made].copy(),
-        int(own.sum()),
-        int(bitplanes.get(filled, texel, layer).sum()),
+        shown.rendered,
+        int(shown.filled.sum()),
     )
 
 
