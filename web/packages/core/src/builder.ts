@@ -4,6 +4,12 @@ import { FarfieldError, asError, AbortedError } from './errors.js';
 import type { CellFile, NearReference, Vec3 } from './format.js';
 import { WALK_VERSION } from './format.js';
 import { buildNearBatches, type NearBatch, type NearSource } from './near.js';
+import {
+  findObjects,
+  type FindOptions,
+  type FoundObjects,
+  type Triangles,
+} from './objects/find-objects.js';
 import { buildQuadVertices, type QuadVertices } from './quads.js';
 
 /** What a cell file says, ready to upload. */
@@ -18,6 +24,8 @@ export interface CellBuilder {
   /** Build a cell from its file's bytes, which may be taken away from the caller. */
   cell(bytes: ArrayBuffer, resolution: number): Promise<BuiltCell>;
   near(sources: readonly NearSource[], centre: Vec3): Promise<NearBatch[]>;
+  /** Find the objects of a near field; the caller keeps its arrays. */
+  objects(batches: readonly Triangles[], options: FindOptions): Promise<FoundObjects>;
   dispose(): void;
 }
 
@@ -51,6 +59,10 @@ export class InlineBuilder implements CellBuilder {
     return Promise.resolve(buildNearBatches(sources, centre));
   }
 
+  async objects(batches: readonly Triangles[], options: FindOptions): Promise<FoundObjects> {
+    return Promise.resolve(findObjects(batches, options));
+  }
+
   dispose(): void {
     return;
   }
@@ -58,10 +70,11 @@ export class InlineBuilder implements CellBuilder {
 
 export type BuildRequest =
   | { id: number; kind: 'cell'; bytes: ArrayBuffer; resolution: number }
-  | { id: number; kind: 'near'; sources: readonly NearSource[]; centre: Vec3 };
+  | { id: number; kind: 'near'; sources: readonly NearSource[]; centre: Vec3 }
+  | { id: number; kind: 'objects'; batches: readonly Triangles[]; options: FindOptions };
 
 export type BuildReply =
-  { id: number; value: BuiltCell | NearBatch[] } | { id: number; error: string };
+  { id: number; value: BuiltCell | NearBatch[] | FoundObjects } | { id: number; error: string };
 
 interface Waiting {
   readonly resolve: (value: never) => void;
@@ -96,12 +109,16 @@ export class WorkerBuilder implements CellBuilder {
     return this.ask({ id: this.next++, kind: 'near', sources, centre }, []);
   }
 
+  objects(batches: readonly Triangles[], options: FindOptions): Promise<FoundObjects> {
+    return this.ask({ id: this.next++, kind: 'objects', batches, options }, []);
+  }
+
   dispose(): void {
     this.worker.terminate();
     this.fail(new AbortedError());
   }
 
-  private ask<T extends BuiltCell | NearBatch[]>(
+  private ask<T extends BuiltCell | NearBatch[] | FoundObjects>(
     request: BuildRequest,
     transfer: Transferable[],
   ): Promise<T> {
@@ -126,6 +143,13 @@ export function answer(request: BuildRequest): { reply: BuildReply; transfer: Ar
       return {
         reply: { id: request.id, value },
         transfer: [positions.buffer, texels.buffer, indices.buffer],
+      };
+    }
+    if (request.kind === 'objects') {
+      const value = findObjects(request.batches, request.options);
+      return {
+        reply: { id: request.id, value },
+        transfer: value.batches.map(({ indices }) => indices.buffer),
       };
     }
     const value = buildNearBatches(request.sources, request.centre);
