@@ -21,6 +21,7 @@ import {
   Vector3,
   type Camera,
   type IUniform,
+  type Object3D,
   type WebGLRenderer,
 } from 'three';
 import type { CellView } from './cell-view.js';
@@ -112,6 +113,18 @@ export class Walk extends EventDispatcher<WalkEvents> {
   /** The camera whose place decides which cells are loaded. */
   setCamera(camera: Camera): void {
     this.camera = camera;
+  }
+
+  /** Put an object of your own into the walk, in the scene's coordinates. */
+  add(object: Object3D): this {
+    this.group.add(object);
+    return this;
+  }
+
+  /** Take an object out again. */
+  remove(object: Object3D): this {
+    this.group.remove(object);
+    return this;
   }
 
   /** Call once a frame, before drawing. */
