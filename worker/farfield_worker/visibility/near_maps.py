@@ -24,6 +24,7 @@ from farfield_worker.gl.programs import set_uniforms
 from farfield_worker.gl.scene_buffers import SceneBuffers
 from farfield_worker.visibility.clusters import Clusters, InView
 from farfield_worker.visibility.depth_maps import NEAREST
+from farfield_worker.visibility.pyramid import not_behind
 
 Floats = NDArray[np.float64]
 
@@ -136,7 +137,7 @@ class NearMapRenderer:
             ids.append(self._draw(context, rest.take(slice(some)), eye, face, 0))
             rest = rest.take(slice(some, None))
             if len(rest.cluster):
-                rest = self._near.not_hidden(rest, self._shown()[..., 0])
+                rest = not_behind(rest, self._shown()[..., 0])
                 ids.append(self._draw(context, rest, eye, face, sum(map(len, ids)) - 1))
             if len(holey.cluster):
                 ids.append(self._draw(context, holey, eye, face, sum(map(len, ids)) - 1))
@@ -144,7 +145,7 @@ class NearMapRenderer:
             solid = shown[..., 0]
             if len(holey.cluster):
                 self.buffers.set(least_opacity=0.0)
-                holey = self._near.not_hidden(holey, solid)
+                holey = not_behind(holey, solid)
                 ids.append(self._draw(context, holey, eye, face, sum(map(len, ids)) - 1))
                 shown = self._shown()
         return NearMap(solid, np.concatenate(ids)[shown[..., 1].astype(np.int32)])
@@ -181,3 +182,10 @@ class NearMapRenderer:
         """What is drawn so far: (h, w, 2) float32, disparity and number of the triangle from 1."""
         data = np.frombuffer(self._picture.read(), np.float32)
         return data.reshape(self.resolution, self.resolution, 2)
+
+
+def farthest_around(disparity: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Least disparity in the 3 x 3 texels around each of a map (h, w): (h, w) float32."""
+    grown = np.pad(disparity, 1, mode="edge")
+    rows = np.minimum(np.minimum(grown[:-2], grown[1:-1]), grown[2:])
+    return np.minimum(np.minimum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:])
