@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from farfield_core.errors import BadInputError
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 VARIABLES = {
     "store": "FARFIELD_STORE",
     "broker": "FARFIELD_BROKER",
+    "device": "FARFIELD_DEVICE",
     "web": "FARFIELD_WEB",
     "upload_limit": "FARFIELD_UPLOAD_LIMIT",
     "jobs": "FARFIELD_JOBS",
@@ -31,6 +32,8 @@ class ApiSettings(BaseModel):
     store: str = "farfield-store"
     #: redis://..., or empty: cells are baked by processes of this server
     broker: str = ""
+    #: which workers of the farm bake: those that draw with a GPU, or all others
+    device: Literal["cpu", "gpu"] = "cpu"
     #: folder of the built pages
     web: Path = BUILT_WEB
     #: greatest size of a file sent in one request, bytes
