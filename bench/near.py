@@ -29,7 +29,7 @@ import numpy as np
 from farfield_core import layout
 from farfield_core.bake import create_bake
 from farfield_core.corridor import Corridor, read_corridor
-from farfield_core.ground import ground_of
+from farfield_core.ground import ground_under
 from farfield_core.scene import PreparedScene
 from farfield_core.scenes import open_prepared
 from farfield_core.settings import BakeSettings
@@ -92,7 +92,7 @@ def bake(store: Store, scene: PreparedScene, name: str, cells: int, **settings: 
 
     corridor = corridor_of(name, cells)
     edge = SCENES[name].cell_size
-    ground = ground_of(scene)
+    ground = ground_under(scene, corridor)
     walks, bakers = {}, {}
     for on in (True, False):
         chosen = BakeSettings(

@@ -10,7 +10,7 @@ from farfield_core.bake import create_bake
 from farfield_core.corridor import Corridor, Ground, parse_corridor
 from farfield_core.dispatch import Dispatcher, Listener
 from farfield_core.errors import BadInputError, NotFoundError
-from farfield_core.ground import ground_of
+from farfield_core.ground import ground_under
 from farfield_core.scene import SceneInfo
 from farfield_core.settings import BakeSettings
 from farfield_core.store import Store
@@ -79,7 +79,7 @@ class FarfieldService:
         """What a corridor follows, where it does."""
         if not corridor.follow_ground:
             return None
-        return ground_of(core_scenes.open_prepared(self.store, scene))
+        return ground_under(core_scenes.open_prepared(self.store, scene), corridor)
 
     def create_bake(self, scene: str, corridor: Corridor, settings: BakeSettings) -> str:
         """Write a bake's manifest and have it baked; returns its id."""
