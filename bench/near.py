@@ -8,7 +8,7 @@ Cells of real scenes, baked with visibility on and off in one run, one process o
   cell, in random directions, drawn from their files; for slanted quads, whose planes differ with
   what is left out, share that is missing on one side only;
 - near triangles and far texels listed and stored, on : off, and near triangles against what 1,000
-  random eyes see in maps twice as fine as a face;
+  random eyes see in maps as fine as a face;
 - seconds that visibility adds to a cell, on : off, processor time of neighbouring cells in turn;
 - bytes of near geometry that a step into the next cell fetches, against the whole cell's.
 """
@@ -28,8 +28,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from farfield_core import layout
 from farfield_core.bake import create_bake
-from farfield_core.corridor import read_corridor
-from farfield_core.ground import ground_of
+from farfield_core.corridor import Corridor, read_corridor
+from farfield_core.ground import ground_under
 from farfield_core.scene import PreparedScene
 from farfield_core.scenes import open_prepared
 from farfield_core.settings import BakeSettings
@@ -41,9 +41,9 @@ from numpy.typing import NDArray
 from bench.stand import one_process, report
 from tests.corridors.scenes import SCENES
 
-#: scenes measured if none are named
-DEFAULT = ("medieval_town_2M", "hotel_room", "pandora")
-EYES, WITNESSES, CELLS = 200, 1000, 4
+#: scenes measured if none are named, with the number of cells that times are averaged over
+DEFAULT = {"medieval_town_2M": 24, "hotel_room": 4, "pandora": 4}
+EYES, WITNESSES = 200, 1000
 #: pixels across a picture
 SIZE = 512
 
@@ -68,13 +68,31 @@ def prepared(name: str) -> Iterator[tuple[Store, PreparedScene]]:
         yield store, open_prepared(store, info.id)
 
 
+def corridor_of(name: str, cells: int) -> Corridor:
+    """The scene's corridor, in its direction, for about that many cells: three abreast from 12."""
+    corridor = read_corridor(SCENES[name].corridor)
+    assert corridor.path is not None
+    edge = SCENES[name].cell_size
+    first, second = np.array(corridor.path.points)
+    abreast = 3 if cells >= 12 else 1
+    length = (cells / abreast - 0.6) * edge
+    along = (second - first) * length / math.dist(first, second)
+    path = corridor.path.model_copy(
+        update={
+            "points": (tuple(first.tolist()), tuple((first + along).tolist())),
+            "width": 1.2 * edge if abreast == 3 else 0.1 * edge,
+        }
+    )
+    return corridor.model_copy(update={"path": path})
+
+
 def bake(store: Store, scene: PreparedScene, name: str, cells: int, **settings: Any) -> Pair:
     """Bake the first cells of the scene's corridor both ways, in turn."""
     from farfield_worker.cell.bake import CellBaker  # noqa: PLC0415
 
-    corridor = read_corridor(SCENES[name].corridor)
+    corridor = corridor_of(name, cells)
     edge = SCENES[name].cell_size
-    ground = ground_of(scene)
+    ground = ground_under(scene, corridor)
     walks, bakers = {}, {}
     for on in (True, False):
         chosen = BakeSettings(
@@ -144,10 +162,10 @@ def differing(store: Store, pair: Pair, number: int, views: int) -> dict[str, fl
 
 
 def witnessed(scene: PreparedScene, walk: Walk, centre: NDArray[np.float64], eyes: int) -> int:
-    """Near triangles that random eyes see, in maps twice as fine as a face."""
+    """Near triangles that random eyes see, in maps as fine as a face."""
     from farfield_worker.visibility.near_maps import NearMapRenderer  # noqa: PLC0415
 
-    renderer = NearMapRenderer(scene, 2 * walk.resolution)
+    renderer = NearMapRenderer(scene, walk.resolution)
     renderer.enter(centre, walk.near_drawn)
     half = np.array(walk.grid.size) / 2
     rng = np.random.default_rng(1000)
@@ -165,10 +183,10 @@ def near_bytes(store: Store, cell: CellFile) -> dict[str, int]:
     return {part.blob: store.size(layout.near_key(part.blob)) or 0 for part in cell.near}
 
 
-def measure(name: str, settings: dict[str, Any]) -> dict[str, Any]:
-    """All figures of one scene under `settings`, those of the first cell and of its neighbours."""
+def measure(name: str, cells: int, settings: dict[str, Any]) -> dict[str, Any]:
+    """All figures of one scene under `settings`: sums over `cells` cells, pictures of the first."""
     with prepared(name) as (store, scene):
-        pair = bake(store, scene, name, CELLS, **settings)
+        pair = bake(store, scene, name, cells, **settings)
         on, off = pair.cells[True], pair.cells[False]
         total = {
             key: [sum(cell.figures[key] for cell in cells) for cells in (on, off)]
@@ -180,8 +198,10 @@ def measure(name: str, settings: dict[str, Any]) -> dict[str, Any]:
             for before, after in pairwise(sizes)
             if after
         ]
-        centre = np.array(on[0].eyes[0])
-        witnesses = witnessed(scene, pair.on, centre, WITNESSES)
+        # both kinds of quads have the same near field
+        witnesses = 0
+        if settings["quads"] == "layers":
+            witnesses = witnessed(scene, pair.on, np.array(on[0].eyes[0]), WITNESSES)
         return {
             "near_field": pair.on.near_field,
             **differing(store, pair, 0, EYES),
@@ -189,12 +209,12 @@ def measure(name: str, settings: dict[str, Any]) -> dict[str, Any]:
             "near_triangles": on[0].figures["near_triangles"],
             "near_triangles_off": off[0].figures["near_triangles"],
             "near_triangles_witnessed": witnesses,
-            "near_triangles_to_witnessed": on[0].figures["near_triangles"] / max(witnesses, 1),
             "texels": on[0].figures["texels"],
             "eyes": on[0].figures["eyes"],
             "seconds_added": sum(pair.seconds[True]) / sum(pair.seconds[False]) - 1,
-            "seconds": pair.seconds[True],
-            "seconds_off": pair.seconds[False],
+            "cells": len(on),
+            "seconds": float(np.mean(pair.seconds[True])),
+            "seconds_off": float(np.mean(pair.seconds[False])),
             "near_kilobytes": float(np.mean([sum(s.values()) for s in sizes])) / 1024,
             "step_bytes": float(np.mean(steps)) if steps else 0.0,
         }
@@ -205,7 +225,9 @@ def figures() -> dict[str, Any]:
     one_process()
     names = [word for word in sys.argv[1:] if not word.startswith("-")] or list(DEFAULT)
     return {
-        f"{name} {quads}": measure(name, {"quads": quads})
+        f"{name} {quads}": measure(
+            name, DEFAULT.get(name, 2) if quads == "layers" else 2, {"quads": quads}
+        )
         for name in names
         for quads in ("layers", "slanted")
     }

@@ -8,13 +8,8 @@ own GL, one `readPixels` fence a frame. Frames that are compared are drawn in tu
 (`growth`: in two pages), the best of three from each place; ratios are medians. The full model is
 drawn by three.js with the walk's own light, its triangles merged per material in 16, 64 or 256
 chunks that the frustum culls; the fastest of these counts. Figures that end in `processor` count
-<<<<<<< HEAD
 processor time of the page and of the graphics process instead of the clock: on a busy machine they
 are the ones to believe. `--quick` is a small version of everything, for tests.
-=======
-processor time of the page and of the graphics process instead of the clock: on a busy machine they are the
-ones to believe. `--quick` is a small version of everything, for tests.
->>>>>>> origin/viewer
 """
 
 from __future__ import annotations

@@ -209,5 +209,3 @@ def running(server: Server) -> Iterator[None]:
         yield
     finally:
         server.kill()
-
-

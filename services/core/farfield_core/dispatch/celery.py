@@ -255,9 +255,7 @@ class CeleryDispatcher:
 
     def _under_way(self) -> list[Job]:
         with self._changed:
-            return [
-                job for job in self._jobs.values() if job.running or job.state not in ENDED
-            ]
+            return [job for job in self._jobs.values() if job.running or job.state not in ENDED]
 
     def _hear(self) -> None:
         """Take in what workers say of their cells."""

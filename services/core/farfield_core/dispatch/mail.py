@@ -74,4 +74,3 @@ class Mail:
         """Free the connections."""
         self._redis.close()
         self._app.close()
-
