@@ -129,7 +129,7 @@ class Session(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    key: str = Field(min_length=1, max_length=200, examples=["farfield_vJ8Q..."])
+    key: str = Field(pattern=r"^[!-~]{1,200}$", examples=["farfield_vJ8Q..."])
 
 
 class NewScene(BaseModel):

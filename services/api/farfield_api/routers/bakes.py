@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Depends, Query, Request
 
 from farfield_api.bakes import Progress
-from farfield_api.dependencies import Service
+from farfield_api.dependencies import Service, known_scene_in_body
 from farfield_api.exceptions import problems
 from farfield_api.listing import Cursor, Limit, page
 from farfield_api.names import BakeId
@@ -43,7 +43,12 @@ def describe(progress: Progress) -> BakeBody:
     )
 
 
-@router.post("", status_code=201, responses=problems(403, 404, 409, 422))
+@router.post(
+    "",
+    status_code=201,
+    responses=problems(403, 404, 409, 422),
+    dependencies=[Depends(known_scene_in_body)],
+)
 def add_bake(http: Request, service: Service, request: BakeRequest) -> NewBake:
     """Ask for a bake. The same scene, corridor and settings are the same bake."""
     corridor = service.corridor(request.scene, request.corridor)

@@ -8,11 +8,11 @@ from farfield_core import layout
 from farfield_core.corridor import Corridor, cut
 from farfield_core.scenes import Orientation
 from farfield_core.settings import BakeSettings
-from fastapi import APIRouter, Body, Query, Request
+from fastapi import APIRouter, Body, Depends, Query, Request
 from fastapi.responses import Response
 
 from farfield_api import immutable
-from farfield_api.dependencies import Service
+from farfield_api.dependencies import Service, known_scene
 from farfield_api.exceptions import problems
 from farfield_api.listing import Cursor, Limit, page
 from farfield_api.names import PreparedName, SceneId
@@ -117,14 +117,24 @@ def suggestion(service: Service, scene: SceneId) -> SuggestionBody:
     )
 
 
-@router.post("/{scene}/orientation", status_code=201, responses=problems(404, 409, 422))
+@router.post(
+    "/{scene}/orientation",
+    status_code=201,
+    responses=problems(404, 409, 422),
+    dependencies=[Depends(known_scene)],
+)
 def reorient(service: Service, scene: SceneId, orientation: Orientation) -> NewScene:
     """Read the same model with another axis up or in another unit: a scene of its own."""
     turned = service.scenes.reorient(scene, orientation)
     return NewScene(id=turned, state=service.scenes.describe(turned).state)
 
 
-@router.post("/{scene}/corridors", status_code=201, responses=problems(404, 409, 422))
+@router.post(
+    "/{scene}/corridors",
+    status_code=201,
+    responses=problems(404, 409, 422),
+    dependencies=[Depends(known_scene)],
+)
 def add_corridor(
     service: Service,
     scene: SceneId,

@@ -47,7 +47,8 @@ UploadId = Annotated[
     str, Path(pattern=r"^[0-9a-f]{32}$", description="An upload's id, from its Location.")
 ]
 Resumable = Annotated[
-    str | None, Header(alias="Tus-Resumable", description="1.0.0", examples=[VERSION])
+    # anything else is answered with 412, as tus has it, not with 422
+    str | None, Header(alias="Tus-Resumable", include_in_schema=False)
 ]
 Offset = Annotated[
     str,
@@ -67,14 +68,17 @@ _HEADERS: dict[str, Any] = {
     "Upload-Offset": {"schema": {"type": "string"}, "description": "Bytes that have arrived."},
     "Upload-Expires": {"schema": {"type": "string"}, "description": "When it is forgotten."},
 }
-_BODY: dict[str, Any] = {
-    "requestBody": {
-        "content": {
-            "application/offset+octet-stream": {"schema": {"type": "string", "format": "binary"}}
+# The bodies are not described: few tools know their media type, and a schema says nothing of bytes.
+_SAID: dict[str, Any] = {
+    "parameters": [
+        {
+            "name": "Tus-Resumable",
+            "in": "header",
+            "required": True,
+            "schema": {"type": "string", "enum": [VERSION]},
         }
-    }
+    ]
 }
-
 
 class TusHeaders:
     """ASGI middleware: every answer below `prefix` says which protocol it speaks."""
@@ -120,7 +124,7 @@ def options(service: Service) -> Response:
         201: {"headers": {"Location": {"schema": {"type": "string"}}, **_HEADERS}},
         **problems(409, 412, 413, 422, 423, 507),
     },
-    openapi_extra=_BODY,
+    openapi_extra=_SAID,
     operation_id="create_upload",
 )
 async def create(
@@ -160,7 +164,12 @@ async def create(
     return Response(None, 201, headers | _expires(service, upload))
 
 
-@router.head("/{upload}", operation_id="head_upload", responses=problems(404, 410, 412, 422))
+@router.head(
+    "/{upload}",
+    operation_id="head_upload",
+    responses=problems(404, 410, 412, 422),
+    openapi_extra=_SAID,
+)
 def head(service: Service, upload: UploadId, tus_resumable: Resumable = None) -> Response:
     """Tell how many bytes have arrived."""
     _check_version(tus_resumable)
@@ -193,7 +202,7 @@ def get(service: Service, upload: UploadId) -> UploadBody:
     "/{upload}",
     status_code=204,
     responses={204: {"headers": _HEADERS}, **problems(404, 409, 410, 412, 413, 415, 422, 423, 507)},
-    openapi_extra=_BODY,
+    openapi_extra=_SAID,
     operation_id="append_to_upload",
 )
 async def append(
@@ -205,11 +214,14 @@ async def append(
     content_type: Annotated[str, Header(include_in_schema=False)] = "",
     upload_checksum: Checksum = None,
 ) -> Response:
-    """Add bytes; what arrived before a connection broke stays, unless it has a checksum."""
+    """Add the body, which is application/offset+octet-stream, to an upload.
+
+    What arrived before a connection broke stays, unless it has a checksum.
+    """
     _check_version(tus_resumable)
+    found = await run_in_threadpool(service.uploads.get, upload)
     if content_type != "application/offset+octet-stream":
         raise HTTPException(415, "The body has to be application/offset+octet-stream.")
-    found = await run_in_threadpool(service.uploads.get, upload)
     await _append(request, service, found, int(upload_offset), upload_checksum)
     headers = {"Upload-Offset": str(service.uploads.offset(found))}
     return Response(None, 204, headers | _expires(service, found))
@@ -218,6 +230,7 @@ async def append(
 @router.delete(
     "/{upload}",
     status_code=204,
+    openapi_extra=_SAID,
     operation_id="delete_upload",
     responses=problems(404, 410, 412, 422, 423),
 )
