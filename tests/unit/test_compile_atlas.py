@@ -17,7 +17,7 @@ HALF = (1.0, 1.0, 1.0)
 
 def compiled(seed, resolution, layers, grower, largest, numbers):
     rules = Rules(
-        placement.place(HALF, max(resolution, 16), layers).layers, resolution, 8, grower, largest
+        placement.place(HALF, max(resolution, 16), layers).layers, resolution, grower, largest
     )
     return rules.layers, {
         number: compile_face(random_face(seed + number, resolution, layers + 1), rules, HALF)
@@ -109,7 +109,7 @@ def test_compile_face_keeps_what_was_rendered_in_front(grower):
     resolution = 70
     for seed in range(20):
         face = random_face(seed, resolution, 5)
-        rules = Rules(placement.place(HALF, 70, 4).layers, resolution, 8, grower, 1000)
+        rules = Rules(placement.place(HALF, 70, 4).layers, resolution, grower, 1000)
         out = compile_face(face, rules, HALF)
         layer = out.boxes[out.owner, 0]
         assert (np.diff(layer.astype(np.int64) * resolution**2 + out.texel) > 0).all()

@@ -17,9 +17,6 @@ from farfield_worker.compile.pack import GUTTER
 from farfield_worker.compile.quads import layer_quads
 from farfield_worker.render import Renderer, open_renderer
 
-#: a steep surface may pass this many layers from texel to texel and is still filled (`gaps`)
-REACH = 8
-
 
 class LayeredImpostors:
     """Makes layer quads."""
@@ -33,7 +30,6 @@ class LayeredImpostors:
         self._rules = Rules(
             walk.layers,
             walk.resolution,
-            REACH,
             settings.grower,
             gutter_free(min(walk.atlas.width, walk.atlas.height), GUTTER),
         )

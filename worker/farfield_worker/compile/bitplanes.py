@@ -8,6 +8,8 @@ the face every bit is 0.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -21,24 +23,12 @@ def empty(layers: int, resolution: int) -> Planes:
 
 
 @njit(cache=True)
-def put(planes, texel, layer):
+def put(planes: Any, texel: Any, layer: Any) -> None:
     """Set the bits of texels (n,) int32 (row * resolution + column) on layers (n,) int16."""
     resolution = planes.shape[1]
     for n in range(texel.size):
         row, column = divmod(texel[n], resolution)
         planes[layer[n], row, column >> 6] |= np.uint64(1) << np.uint64(column & 63)
-
-
-@njit(cache=True)
-def get(planes, texel, layer):
-    """Return the bits of texels (n,) int32 on layers (n,) int16, as (n,) bool."""
-    resolution = planes.shape[1]
-    out = np.empty(texel.size, np.bool_)
-    for n in range(texel.size):
-        row, column = divmod(texel[n], resolution)
-        word = planes[layer[n], row, column >> 6]
-        out[n] = (word >> np.uint64(column & 63)) & np.uint64(1) != 0
-    return out
 
 
 def listed(planes: Planes) -> tuple[NDArray[np.int32], NDArray[np.int16]]:
@@ -69,4 +59,20 @@ def erode(plane: Planes, down: int, across: int) -> Planes:
         right[:, 1:] |= plane[:, :-1] >> top
         left[:, :-1] |= plane[:, 1:] << top
         plane = right & left & plane
+    return plane
+
+
+def dilate(plane: Planes, rings: int) -> Planes:
+    """Bits with a set bit at most `rings` rows and columns away; `plane` is (R, words).
+
+    Bits beyond the face's edge may be set in the last word.
+    """
+    one, top = np.uint64(1), np.uint64(63)
+    for _ in range(rings):
+        wider = plane | plane << one | plane >> one
+        wider[:, 1:] |= plane[:, :-1] >> top
+        wider[:, :-1] |= plane[:, 1:] << top
+        plane = wider.copy()
+        plane[1:] |= wider[:-1]
+        plane[:-1] |= wider[1:]
     return plane

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
@@ -25,14 +24,12 @@ class Rules(NamedTuple):
     Attributes:
         layers: distances of the layers, far to near, metres.
         resolution: texels across a face.
-        reach: most layers that a surface may pass from texel to texel and still be filled.
         grower: how texels become rectangles.
         largest: most texels along an edge of a rectangle.
     """
 
     layers: Sequence[float]
     resolution: int
-    reach: int
     grower: Literal["greedy", "best"]
     largest: int
 
@@ -62,20 +59,18 @@ def compile_face(
 ) -> CompiledFace:
     """Compile a face of a cell with `half` extents in the face's axes (right, down, forward).
 
-    `texels` may go on beyond the last layer, into the near field (`gaps`).
+    `texels` have one layer more, just inside the near field: it is filled under like any other, so
+    that no gap opens at the near border, and not stored.
     """
     count, resolution = len(rules.layers), rules.resolution
     shifts = reaches(rules.layers, half, resolution)
     rings = max([1, *(max(pair) for pair in shifts)])
-    own = texels.layer < count
-    planes = bitplanes.empty(count, resolution)
-    bitplanes.put(planes, texels.texel[own], texels.layer[own])
-    starts = columns(texels, resolution)
-    filled = fill_gaps(texels, starts, planes, rings, rules.reach)
-    covered = planes | filled
-    shown = covered & ~hidden(covered, shifts)
-    texel, layer = bitplanes.listed(shown)
-    color = texels.color.view(np.uint32).reshape(-1)[sources(starts, texels.layer, texel, layer)]
+    drawn = bitplanes.empty(count + 1, resolution)
+    bitplanes.put(drawn, texels.texel, texels.layer)
+    covered = drawn[:count] | fill_gaps(drawn, rings)
+    texel, layer = bitplanes.listed(covered & ~hidden(covered, shifts))
+    starts = columns(texels.texel, resolution)
+    source = sources(starts, texels.layer, texel, layer)
     owner = np.empty(len(texel), np.int32)
     boxes = np.empty((len(texel), 5), np.int32)
     boxes_made = GROWERS[rules.grower](
@@ -83,14 +78,14 @@ def compile_face(
     )
     return CompiledFace(
         texel,
-        color,
+        texels.color.view(np.uint32).reshape(-1)[source],
         owner,
         boxes[:boxes_made].copy(),
-        int(own.sum()),
-        int(bitplanes.get(filled, texel, layer).sum()),
+        int((texels.layer < count).sum()),
+        int((texels.layer[source] > layer).sum()),
     )
 
 
 def gutter_free(page: int, gutter: int) -> int:
     """Longest edge of a rectangle that fits on a page `page` texels wide."""
-    return max(1, math.floor(page - 2 * gutter))
+    return max(1, page - 2 * gutter)
