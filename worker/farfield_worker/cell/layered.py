@@ -32,6 +32,7 @@ class LayeredImpostors:
             walk.resolution,
             settings.grower,
             gutter_free(min(walk.atlas.width, walk.atlas.height), GUTTER),
+            settings.gap_fill == "steep",
         )
         # One more layer inside the near field tells gap filling where surfaces come nearer still.
         inner = placement.place(

@@ -10,6 +10,8 @@ the largest box that it lies in, and boxes shrink to what is left for them.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
@@ -72,7 +74,7 @@ def _merge(boxes, texels, among, most, widest, highest):
             if cost < best[j]:
                 best[j], partner[j] = cost, i
             j = following[j]
-    area = np.sum(boxes[:, 3] * boxes[:, 4])
+    area: Any = np.sum(boxes[:, 3] * boxes[:, 4])
     count = n
     while True:
         limit = _NEVER
@@ -131,10 +133,11 @@ def _merge(boxes, texels, among, most, widest, highest):
             count += 1
     remain = np.flatnonzero(alive[:count])
     out = np.empty((len(remain), 5), np.int32)
-    for n, i in enumerate(remain):
-        out[n, 0] = boxes[band[i], 0]
-        out[n, 1], out[n, 2] = left[i], top[i]
-        out[n, 3], out[n, 4] = right[i] - left[i], bottom[i] - top[i]
+    for at in range(len(remain)):
+        i = remain[at]
+        out[at, 0] = boxes[band[i], 0]
+        out[at, 1], out[at, 2] = left[i], top[i]
+        out[at, 3], out[at, 4] = right[i] - left[i], bottom[i] - top[i]
     return out
 
 

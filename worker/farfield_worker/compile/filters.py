@@ -8,6 +8,8 @@ and average, won on 3 of 4,096 rows of atlas pages and are not tried.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
@@ -15,7 +17,7 @@ _SUB, _UP, _PAETH = 1, 2, 4
 
 
 @njit(cache=True)
-def _paeth(a, b, c):
+def _paeth(a: Any, b: Any, c: Any) -> Any:
     """Whichever of left `a`, above `b` and upper left `c` is closest to a + b - c."""
     from_a, from_b, from_c = abs(b - c), abs(a - c), abs(a + b - 2 * c)
     if from_a <= from_b and from_a <= from_c:
@@ -24,7 +26,7 @@ def _paeth(a, b, c):
 
 
 @njit(cache=True)
-def filtered(rows, texel):
+def filtered(rows: Any, texel: int) -> Any:
     """Filter rows (height, bytes) uint8 of texels `texel` bytes wide: (height, 1 + bytes) uint8."""
     height, width = rows.shape
     out = np.empty((height, 1 + width), np.uint8)
@@ -41,7 +43,7 @@ def filtered(rows, texel):
             tried[_PAETH, n] = value - _paeth(a, b, c)
         best, least = 0, 128 * width + 1
         for kind in (_UP, _PAETH, _SUB):
-            total = 0
+            total: Any = 0
             for n in range(width):
                 difference = np.int32(tried[kind, n])
                 total += min(difference, 256 - difference)

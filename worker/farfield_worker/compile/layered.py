@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -13,9 +13,10 @@ from farfield_worker.compile.best import best
 from farfield_worker.compile.gaps import columns, fill_gaps, sources
 from farfield_worker.compile.greedy import greedy
 from farfield_worker.compile.hidden import hidden, reaches
+from farfield_worker.compile.steep import fill_steep
 from farfield_worker.render.interface import FaceTexels
 
-GROWERS = {"greedy": greedy, "best": best}
+GROWERS: dict[str, Callable[..., int]] = {"greedy": greedy, "best": best}
 
 
 class Rules(NamedTuple):
@@ -26,12 +27,14 @@ class Rules(NamedTuple):
         resolution: texels across a face.
         grower: how texels become rectangles.
         largest: most texels along an edge of a rectangle.
+        steep: whether surfaces that skip layers are filled too, beyond the paper's rule.
     """
 
     layers: Sequence[float]
     resolution: int
     grower: Literal["greedy", "best"]
     largest: int
+    steep: bool = True
 
 
 class CompiledFace(NamedTuple):
@@ -68,8 +71,12 @@ def compile_face(
     drawn = bitplanes.empty(count + 1, resolution)
     bitplanes.put(drawn, texels.texel, texels.layer)
     covered = drawn[:count] | fill_gaps(drawn, rings)
-    texel, layer = bitplanes.listed(covered & ~hidden(covered, shifts))
+    unseen = hidden(covered, shifts)
     starts = columns(texels.texel, resolution)
+    if rules.steep:
+        covered |= fill_steep(texels, starts, covered | unseen, rings)
+        unseen = hidden(covered, shifts)
+    texel, layer = bitplanes.listed(covered & ~unseen)
     source = sources(starts, texels.layer, texel, layer)
     owner = np.empty(len(texel), np.int32)
     boxes = np.empty((len(texel), 5), np.int32)
