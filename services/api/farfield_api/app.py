@@ -17,7 +17,7 @@ from fastapi.routing import APIRoute
 
 from farfield_api import __version__, exceptions, pages
 from farfield_api.limits import BodyLimit
-from farfield_api.routers import bakes, events, health, plans, scenes, uploads, walks
+from farfield_api.routers import bakes, events, farm, health, plans, scenes, uploads, walks
 from farfield_api.service import FarfieldService
 from farfield_api.settings import ApiSettings
 
@@ -77,7 +77,7 @@ def create_app(settings: ApiSettings, service: FarfieldService | None = None) ->
         BodyLimit, limit=BODY_LIMIT, others={f"{PREFIX}/scenes": settings.upload_limit}
     )
     exceptions.install(app)
-    for module in (health, scenes, uploads, plans, bakes, events, walks):
+    for module in (health, scenes, uploads, plans, bakes, events, walks, farm):
         app.include_router(module.router, prefix=PREFIX)
     pages.install(app, settings.web)
     return app

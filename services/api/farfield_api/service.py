@@ -8,7 +8,7 @@ from collections.abc import Callable
 from farfield_core import scenes as core_scenes
 from farfield_core.bake import create_bake
 from farfield_core.corridor import Corridor, Ground, parse_corridor
-from farfield_core.dispatch import Dispatcher, Listener
+from farfield_core.dispatch import Dispatcher, FarmView, Listener
 from farfield_core.errors import BadInputError, NotFoundError
 from farfield_core.ground import ground_of
 from farfield_core.scene import SceneInfo
@@ -35,6 +35,12 @@ class FarfieldService:
         self.store = store
         self.scenes = Scenes(store, preparer)
         self.bakes = Bakes(store, dispatcher)
+
+    @property
+    def farm(self) -> FarmView | None:
+        """What is known of the farm's workers; None where this server bakes by itself."""
+        dispatcher = self.bakes.dispatcher
+        return dispatcher if isinstance(dispatcher, FarmView) else None
 
     def take_up(self) -> None:
         """Go on where the server before this one stopped."""

@@ -64,7 +64,9 @@ def walk_grid(store: Store, walk: Walk) -> CellGrid:
         index[rows] = np.array([table.i, table.j, table.k], np.int32).T
         y[rows] = table.y
     if row != grid.total:
-        raise BadInputError(f"Walk {walk.id} says that it has {grid.total} cells, but lists others.")
+        raise BadInputError(
+            f"Walk {walk.id} says that it has {grid.total} cells, but lists others."
+        )
     cells = CellGrid(np.array(grid.origin), np.array(grid.size), index, y)
     if grid.cells is not None:
         return cells
