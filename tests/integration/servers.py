@@ -1,4 +1,4 @@
-"""Servers that tests start, kill and let fail: Redis, an S3 gateway, and a proxy that injects faults."""
+"""Servers that tests start and kill: Redis, an S3 gateway, and a proxy that injects faults."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import signal
 import socket
 import subprocess
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -87,7 +86,7 @@ def versitygw() -> str | None:
 
 
 class S3Server(Server):
-    """An S3 server over a folder: versitygw, or moto where there is none."""
+    """An S3 server over a folder: versitygw."""
 
     def __init__(self, folder: Path) -> None:
         self.port = free_port()
@@ -175,7 +174,8 @@ class Faults:
                 if self.command != "HEAD":
                     self.wfile.write(body)
 
-            do_GET = do_PUT = do_HEAD = do_DELETE = do_POST = handle_any
+        for method in ("GET", "PUT", "HEAD", "DELETE", "POST"):
+            setattr(Handler, f"do_{method}", Handler.handle_any)
 
         class Proxy(ThreadingHTTPServer):
             daemon_threads = True

@@ -120,7 +120,7 @@ def test_a_machine_fetches_a_scene_once(
     assert cached_scene(store, "0") == first  # from this machine
     second = cached_scene(store, "1")
     third = cached_scene(store, "2")
-    assert first.exists() and second.exists() and third.exists()  # all are in use
+    assert [path.exists() for path in (first, second, third)] == [True] * 3  # all are in use
     release_scenes()
     fourth = cached_scene(store, "3")
     assert fourth.exists()

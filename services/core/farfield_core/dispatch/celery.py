@@ -14,6 +14,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Literal
 
 from kombu.exceptions import OperationalError
@@ -23,10 +24,12 @@ from farfield_core import control
 from farfield_core.bake import done_names
 from farfield_core.dispatch import ENDED, BakeStatus, Event, Listener
 from farfield_core.dispatch.blame import Blame
-from farfield_core.dispatch.board import Board, Report, Slot
+from farfield_core.dispatch.board import Board, Report
 from farfield_core.dispatch.jobs import Job
 from farfield_core.dispatch.mail import Mail
 from farfield_core.dispatch.queues import Device
+from farfield_core.dispatch.slots import Slot
+from farfield_core.dispatch.wanted import wanted_workers
 from farfield_core.errors import FarfieldError, NotFoundError
 from farfield_core.store import Store
 
@@ -123,7 +126,7 @@ class CeleryDispatcher:
                 if near not in chosen:
                     job.put_back(near)
                     break
-                if not self._without_redis(lambda cell=near: self._send(job, cell, urgent=True)):
+                if not self._without_redis(partial(self._send, job, near, urgent=True)):
                     break
 
     def pause(self, bake: str) -> None:
@@ -178,6 +181,10 @@ class CeleryDispatcher:
         with self._changed:
             jobs = [job for job in self._jobs.values() if job.state in ("queued", "running")]
             return sum(job.left for job in jobs)
+
+    def wanted(self) -> int:
+        """Workers that the cells still to be baked are worth."""
+        return wanted_workers(self.left(), self.slots())
 
     def close(self) -> None:
         """Feed the farm no more; workers finish what is in the queue."""

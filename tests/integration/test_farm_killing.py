@@ -1,0 +1,155 @@
+"""Parts of the farm are killed, emptied and lied to, around a real Redis and a real S3 server.
+
+`make soak` (FARFIELD_SOAK=1) runs the full sizes of the promise: 300 cells, a worker killed every
+5 s, a store that is gone for 30 s. Otherwise the same is done to fewer cells.
+"""
+
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from farfield_core.dispatch.celery import CeleryDispatcher
+from farfield_core.store import Store
+from farfield_core.walk import Walk
+
+from tests.integration.farm import Farm, kill
+from tests.integration.servers import (
+    BUCKET,
+    Faults,
+    RedisServer,
+    S3Server,
+    running,
+    s3_environment,
+)
+from tests.integration.serving import until
+from tests.unit.walks import row_of_cells
+
+SOAK = os.environ.get("FARFIELD_SOAK") == "1"
+CELLS = 300 if SOAK else 36
+#: seconds that a stand-in cell takes, and in which all cells of a test have to be done
+CELL, ENOUGH = (1.0, 900) if SOAK else (0.3, 240)
+
+
+@pytest.fixture
+def redis(tmp_path: Path) -> Iterator[RedisServer]:
+    """A Redis of the test's own, to be killed."""
+    folder = tmp_path / "redis"
+    folder.mkdir()
+    server = RedisServer(folder)
+    with running(server):
+        yield server
+
+
+@pytest.fixture(scope="module")
+def s3(tmp_path_factory: pytest.TempPathFactory) -> Iterator[S3Server]:
+    server = S3Server(tmp_path_factory.mktemp("s3"))
+    with running(server):
+        yield server
+
+
+@pytest.fixture
+def faults(s3: S3Server) -> Iterator[Faults]:
+    proxy = Faults(s3.port)
+    yield proxy
+    proxy.close()
+
+
+@pytest.fixture
+def farm(
+    redis: RedisServer, faults: Faults, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Farm]:
+    """A farm over S3; whatever it asks of the store passes the proxy."""
+    for name, value in s3_environment(faults.endpoint).items():
+        monkeypatch.setenv(name, value)
+    with Farm(redis.url, f"s3://{BUCKET}/{tmp_path.name}", tmp_path) as farm:
+        yield farm
+
+
+def begun(farm: Farm, **options: object) -> tuple[Walk, CeleryDispatcher]:
+    """A bake that is under way."""
+    walk = row_of_cells(farm.store, CELLS)
+    dispatcher, _ = farm.feeder(**options)
+    dispatcher.submit(walk.id)
+    return walk, dispatcher
+
+
+def assert_done(farm: Farm, walk: Walk, dispatcher: CeleryDispatcher) -> None:
+    status = dispatcher.wait(walk.id, timeout=ENOUGH)
+    assert (status.state, status.done, status.failed) == ("done", CELLS, 0), status
+    farm.assert_intact(walk.id, CELLS)
+
+
+def test_workers_killed_again_and_again(farm: Farm) -> None:
+    walk, dispatcher = begun(farm, patience=5.0)
+    workers = [farm.worker(1, **{"*": CELL}) for _ in range(2)]
+    kills = 0
+    while dispatcher.status(walk.id).state != "done" and (SOAK or kills < 4):
+        if SOAK:
+            time.sleep(5)
+        else:
+            until(lambda count=5 * kills + 3: dispatcher.status(walk.id).done >= count)
+        kill(workers.pop(0))
+        kills += 1
+        workers.append(farm.worker(1, wait=False, **{"*": CELL}))
+    assert kills >= 4
+    assert_done(farm, walk, dispatcher)
+    twice = sum(count - 1 for count in farm.finished().values())
+    assert twice < 0.1 * CELLS
+    # what a killed worker had begun is begun again, and nothing else
+    assert sum(farm.attempts().values()) <= CELLS + kills + twice
+
+
+def test_redis_is_killed_and_comes_back(farm: Farm, redis: RedisServer) -> None:
+    walk, dispatcher = begun(farm)
+    farm.worker(2, **{"*": CELL})
+    until(lambda: dispatcher.status(walk.id).done >= 4)
+    redis.kill()
+    time.sleep(5 if SOAK else 2)
+    redis.start()
+    assert_done(farm, walk, dispatcher)
+    assert sum(farm.finished().values()) < 1.1 * CELLS
+
+
+def test_redis_is_emptied(farm: Farm, redis: RedisServer) -> None:
+    walk, dispatcher = begun(farm)
+    farm.worker(2, **{"*": CELL})
+    for round_ in range(10 if SOAK else 2):
+        until(lambda count=4 + 10 * round_: dispatcher.status(walk.id).done >= count)
+        redis.flush()
+    assert_done(farm, walk, dispatcher)
+    assert sum(farm.finished().values()) < 1.1 * CELLS
+
+
+def test_the_store_fails_one_call_in_ten_and_is_gone(farm: Farm, faults: Faults) -> None:
+    walk, dispatcher = begun(farm)
+    faults.share = 0.1
+    farm.worker(2, **{"*": CELL})
+    until(lambda: dispatcher.status(walk.id).done >= 4)
+    faults.gone = True
+    time.sleep(30 if SOAK else 4)
+    faults.gone = False
+    assert_done(farm, walk, dispatcher)
+    assert faults.faults > 0
+
+
+def test_all_of_it_is_killed_and_started_anew(farm: Farm, redis: RedisServer, s3: S3Server) -> None:
+    """The lights go out, and come back with an empty Redis."""
+    walk, dispatcher = begun(farm)
+    worker = farm.worker(2, **{"*": CELL})
+    until(lambda: dispatcher.status(walk.id).done >= 4)
+    kill(worker)
+    dispatcher.close()
+    redis.kill()
+    s3.kill()
+    redis.start()
+    redis.flush()
+    s3.start()
+    farm.store = Store.open(farm.url)
+    fresh, _ = farm.feeder()
+    fresh.submit(walk.id)
+    assert fresh.status(walk.id).done >= 4
+    farm.worker(2, **{"*": CELL})
+    assert_done(farm, walk, fresh)
+    assert max(farm.finished().values()) == 1
