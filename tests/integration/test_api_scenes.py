@@ -62,7 +62,12 @@ def test_the_prepared_scene_can_be_read_and_nothing_beside_it(client: TestClient
     assert np.load(io.BytesIO(positions.content)).shape == (4, 3)
     assert positions.headers["etag"] != answer.headers["etag"]
     assert client.get(f"scenes/{scene}/prepared/map.png").status_code == 404
-    for name in ("%2e%2e/source/scene", "other.json", "textures/%2e%2e/scene.json", "positions.npy/x"):
+    for name in (
+        "%2e%2e/source/scene",
+        "other.json",
+        "textures/%2e%2e/scene.json",
+        "positions.npy/x",
+    ):
         assert client.get(f"scenes/{scene}/prepared/{name}").status_code in (404, 422), name
 
 
