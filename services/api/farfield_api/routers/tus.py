@@ -80,6 +80,7 @@ _SAID: dict[str, Any] = {
     ]
 }
 
+
 class TusHeaders:
     """ASGI middleware: every answer below `prefix` says which protocol it speaks."""
 

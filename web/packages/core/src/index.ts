@@ -18,3 +18,4 @@ export * from './prefetch.js';
 export * from './quads.js';
 export * from './shared-store.js';
 export * from './upload-scheduler.js';
+export * from './zip.js';
