@@ -68,8 +68,13 @@ def create_service(settings: ApiSettings) -> FarfieldService:
     return FarfieldService(settings, store, local, preparer)
 
 
-def create_app(settings: ApiSettings, service: FarfieldService | None = None) -> FastAPI:
-    """Build the application; `service` is made from `settings` unless given."""
+def create_app(
+    settings: ApiSettings,
+    service: FarfieldService | None = None,
+    tracing: Tracing | None = None,
+) -> FastAPI:
+    """Build the application; `service` and `tracing` are made from `settings` unless given."""
+    metrics, tracing = Metrics(), tracing or Tracing(settings.traces)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -99,7 +104,6 @@ def create_app(settings: ApiSettings, service: FarfieldService | None = None) ->
         redoc_url=None,
         generate_unique_id_function=_operation,
     )
-    metrics, tracing = Metrics(), Tracing(settings.traces)
     app.state.metrics, app.state.tracing = metrics, tracing
     # Each is inside the ones that are added after it.
     app.add_middleware(GZipMiddleware, minimum_size=1000, compresslevel=6)
