@@ -24,15 +24,15 @@ from tests.integration.serving import (
 )
 
 
-def walked(client: TestClient, path: str, name: str, limit: int, **query: str) -> list[str]:
+def walked(client: TestClient, path: str, kind: str, limit: int, **query: str) -> list[str]:
     """Ids of a list, page by page."""
     found: list[str] = []
     cursor: str | None = ""
     while cursor is not None:
         asked = {"limit": str(limit), **query} | ({"cursor": cursor} if cursor else {})
         body = client.get(path, params=asked).json()
-        assert len(body[name]) <= limit
-        found += [entry["id"] for entry in body[name]]
+        assert len(body[kind]) <= limit
+        found += [entry["id"] for entry in body[kind]]
         cursor = body["next"]
     return found
 
@@ -73,7 +73,7 @@ def test_numbers(tmp_path: Path) -> None:
         until(lambda: client.get(f"bakes/{bake}").json()["state"] in ("done", "failed"))
         text = client.get("http://test/metrics").text
     assert 'farfield_cells_total{outcome="done"} ' in text
-    route = 'method="GET",route="/api/v1/bakes/{bake}",status="200"'
+    route = 'method="GET",route="/bakes/{bake}",status="200"'
     assert f"farfield_requests_total{{{route}}}" in text
     # never by address
     assert bake not in text
@@ -103,7 +103,7 @@ def test_traces_lead_from_the_request_to_its_cells(tmp_path: Path) -> None:
         until(lambda: client.get(f"bakes/{bake}").json()["state"] == "done")
         until(lambda: len([s for s in spans.get_finished_spans() if s.name[:5] == "cell "]) == 3)
     found = spans.get_finished_spans()
-    (asked,) = [span for span in found if span.name == "POST /api/v1/bakes"]
+    (asked,) = [span for span in found if span.name == "POST /bakes"]
     for cell in (span for span in found if span.name.startswith("cell ")):
         assert cell.parent is not None
         assert cell.parent.span_id == asked.context.span_id
