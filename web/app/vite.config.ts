@@ -16,8 +16,11 @@ export default defineConfig({
         scene: 'scene/index.html',
         bake: 'bake/index.html',
         walk: 'walk/index.html',
+        objects: 'objects/index.html',
       },
-      output: { codeSplitting: { groups: [{ name: 'three', test: /node_modules\/three\// }] } },
+      output: {
+        codeSplitting: { groups: [{ name: 'three', test: /node_modules\/three\/build\// }] },
+      },
     },
   },
 });

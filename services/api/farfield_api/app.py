@@ -54,12 +54,13 @@ def create_service(settings: ApiSettings) -> FarfieldService:
     store = Store.open(settings.store)
     if settings.broker:
         # imported here, because a server without a farm needs no Celery
-        from farfield_core.dispatch.celery import CeleryDispatcher, CeleryPreparer  # noqa: PLC0415
+        from farfield_core.dispatch.celery import CeleryDispatcher  # noqa: PLC0415
+        from farfield_core.dispatch.celery_prepare import CeleryPreparer  # noqa: PLC0415
 
         def farm(listener: Listener) -> Dispatcher:
-            return CeleryDispatcher(store, settings.broker, listener)
+            return CeleryDispatcher(store, settings.broker, listener, device=settings.device)
 
-        return FarfieldService(settings, store, farm, CeleryPreparer(settings.broker))
+        return FarfieldService(settings, store, farm, CeleryPreparer(store, settings.broker))
 
     def local(listener: Listener) -> Dispatcher:
         return LocalDispatcher(store, settings.jobs, listener)

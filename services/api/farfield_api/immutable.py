@@ -52,13 +52,17 @@ def packed(request: Request, name: str, data: bytes, coding: Coding) -> Response
 
 
 def blob(request: Request, store: Store, key: str) -> Response:
-    """Answer with a stored object whose name is its hash; raises NotFoundError.
+    """Answer with a stored object whose name is its hash; raises NotFoundError."""
+    return stored(request, store, key, key.rsplit("/", 1)[-1].partition(".")[0])
 
-    A store that is a folder also answers ranges.
+
+def stored(request: Request, store: Store, key: str, tag: str) -> Response:
+    """Answer with a stored object that never changes; `tag` tells it from all others.
+
+    A store that is a folder also answers ranges. Raises NotFoundError.
     """
-    name = key.rsplit("/", 1)[-1]
-    headers = {"ETag": f'"{name.partition(".")[0]}"', "Cache-Control": FOREVER}
-    media_type = mimetypes.guess_type(name)[0] or "application/octet-stream"
+    headers = {"ETag": f'"{tag}"', "Cache-Control": FOREVER}
+    media_type = mimetypes.guess_type(key)[0] or "application/octet-stream"
     store.size(key)
     if _unchanged(request, headers["ETag"]):
         return Response(None, 304, headers)

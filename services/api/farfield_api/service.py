@@ -13,7 +13,7 @@ from farfield_core.bake import create_bake
 from farfield_core.corridor import Corridor, Ground, parse_corridor
 from farfield_core.dispatch import Dispatcher, Listener
 from farfield_core.errors import BadInputError, NotFoundError
-from farfield_core.ground import ground_of
+from farfield_core.ground import ground_under
 from farfield_core.plan import plan
 from farfield_core.scene import SceneInfo
 from farfield_core.settings import BakeSettings
@@ -100,7 +100,7 @@ class FarfieldService:
         """What a corridor follows, where it does."""
         if not corridor.follow_ground:
             return None
-        return ground_of(core_scenes.open_prepared(self.store, scene))
+        return ground_under(core_scenes.open_prepared(self.store, scene), corridor)
 
     def _suggest(self, scene: str) -> Suggestion:
         """A corridor to begin with; raises as `ready_scene` does."""

@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 VARIABLES = {
     "store": "FARFIELD_STORE",
     "broker": "FARFIELD_BROKER",
+    "device": "FARFIELD_DEVICE",
     "web": "FARFIELD_WEB",
     "upload_limit": "FARFIELD_UPLOAD_LIMIT",
     "jobs": "FARFIELD_JOBS",
@@ -58,6 +59,8 @@ class ApiSettings(BaseModel):
     store: str = "farfield-store"
     #: redis://..., or empty: cells are baked by processes of this server
     broker: str = ""
+    #: which workers of the farm bake: those that draw with a GPU, or all others
+    device: Literal["cpu", "gpu"] = "cpu"
     #: folder of the built pages
     web: Path = BUILT_WEB
     #: greatest size of a file sent in one request, bytes

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from farfield_core import layout, sources
 from farfield_core.errors import NotFoundError
 from farfield_core.scene import PreparedScene, SceneInfo, open_scene
+from farfield_core.scene_cache import cached_scene
 from farfield_core.store import Store
 from farfield_core.validation import parse
 
@@ -177,10 +178,13 @@ def source_model(store: Store, scene: str, into: Path) -> Path:
 
 
 def prepared_folder(store: Store, scene: str, into: Path | None = None) -> Path:
-    """The prepared scene on this machine, copied `into` a folder where the store is none.
+    """The prepared scene on this machine, copied where the store is no folder.
 
-    Raises NotFoundError if it is not (yet) there.
+    It is copied `into` a folder, or into this machine's cache. Raises NotFoundError if it is not
+    (yet) there.
     """
+    if into is None and store.local_path(layout.prepared_prefix(scene)) is None:
+        return cached_scene(store, scene)
     if not store.exists(layout.scene_key(scene)):
         raise NotFoundError(f"There is no prepared scene {scene} in the store.")
     return _local_folder(store, layout.prepared_prefix(scene), into)
@@ -224,14 +228,13 @@ def _local_folder(store: Store, prefix: str, into: Path | None) -> Path:
     folder = store.local_path(prefix)
     if folder is not None:
         return folder
-    if into is None:
-        raise ValueError("a store that is no folder needs a folder to copy to")
+    assert into is not None
     target = into / prefix
     for key in store.list(prefix):
         path = into / key
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
             part = path.with_name(path.name + ".part")
-            part.write_bytes(store.get(key))
+            store.fetch(key, part)
             part.rename(path)
     return target

@@ -15,7 +15,7 @@ from farfield_api import immutable
 from farfield_api.dependencies import Service, known_scene
 from farfield_api.exceptions import problems
 from farfield_api.listing import Cursor, Limit, page
-from farfield_api.names import SceneId
+from farfield_api.names import PreparedName, SceneId
 from farfield_api.scenes import Described
 from farfield_api.schemas import (
     BOX,
@@ -78,6 +78,16 @@ def scenes(
 def scene(service: Service, scene: SceneId) -> SceneBody:
     """Get a scene, and how far it has come."""
     return _body(service.scenes.describe(scene))
+
+
+@router.head("/{scene}/prepared/{file:path}", include_in_schema=False)
+@router.get("/{scene}/prepared/{file:path}", response_class=Response, responses=problems(404, 422))
+def prepared(request: Request, service: Service, scene: SceneId, file: PreparedName) -> Response:
+    """Get a file of the prepared scene: the model itself, or a picture of it."""
+    service.ready_scene(scene)
+    return immutable.stored(
+        request, service.store, layout.prepared_prefix(scene) + file, f"{scene}-{file}"
+    )
 
 
 @router.get("/{scene}/map.png", response_class=Response, responses=_PICTURE)
