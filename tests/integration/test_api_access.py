@@ -186,6 +186,23 @@ def test_other_origins(tmp_path: Path) -> None:
         assert client.options("uploads", headers=asked).status_code == 200
 
 
+def test_pages_of_other_sites_change_nothing(tmp_path: Path) -> None:
+    settings = {"cors": "https://good.example"}
+    with TestClient(
+        app_over(tmp_path / "store", settings=settings), base_url=f"http://test{API}/"
+    ) as client:
+        form = {"file": ("town.glb", b"a model")}
+        evil = {"Sec-Fetch-Site": "cross-site", "Origin": "https://evil.example"}
+        assert "other sites" in problem(client.post("scenes", files=form, headers=evil), 403)
+        assert client.get("scenes", headers=evil).status_code == 200
+        for where in (
+            {"Sec-Fetch-Site": "same-origin", "Origin": "http://test"},
+            {"Sec-Fetch-Site": "cross-site", "Origin": "https://good.example"},
+            {},
+        ):
+            assert client.post("scenes", files=form, headers=where).status_code == 201
+
+
 def test_links_come_from_the_settings(tmp_path: Path) -> None:
     settings = {"base_url": "https://walks.example/far"}
     headers = {

@@ -19,7 +19,7 @@ from fastapi.routing import APIRoute
 from starlette.types import Scope
 
 from farfield_api import __version__, exceptions, pages
-from farfield_api.auth import Auth
+from farfield_api.auth import Auth, OwnPages
 from farfield_api.idempotency import Idempotency
 from farfield_api.keys import Keys
 from farfield_api.limits import BodyLimit
@@ -110,6 +110,7 @@ def create_app(
     app.add_middleware(GZipMiddleware, minimum_size=1000, compresslevel=6)
     app.add_middleware(Idempotency)
     app.add_middleware(TusHeaders, prefix=f"{PREFIX}/uploads")
+    app.add_middleware(OwnPages, origins=settings.origins)
     if settings.needs_keys:
         app.add_middleware(Auth, prefix=PREFIX, keys=_keys, rate=settings.rate)
     app.add_middleware(
