@@ -329,12 +329,12 @@ describe('Walker on solid ground', () => {
 
 describe('words', () => {
   test('the list of bakes is read whatever shape it comes in', () => {
-    const bake = { id: 'b', name: 'City', cells: { done: 2, total: 4 } };
-    const wanted = [{ id: 'b', name: 'City', progress: '2 of 4 cells' }];
+    const bake = { id: 'b', name: 'City', scene: 's', cells: { done: 2, total: 4 } };
+    const wanted = [{ id: 'b', name: 'City', scene: 's', progress: '2 of 4 cells' }];
     expect(readBakes([bake])).toEqual(wanted);
     expect(readBakes({ bakes: [bake] })).toEqual(wanted);
     expect(readBakes({ items: [bake, { name: 'no id' }, null, 3] })).toEqual(wanted);
-    expect(readBakes([{ id: 'b' }])).toEqual([{ id: 'b', name: 'b', progress: '' }]);
+    expect(readBakes([{ id: 'b' }])).toEqual([{ id: 'b', name: 'b', scene: '', progress: '' }]);
     expect(readBakes('nothing')).toEqual([]);
   });
 
