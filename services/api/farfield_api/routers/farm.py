@@ -35,8 +35,8 @@ class Worker(BaseModel):
 class Farm(BaseModel):
     """The farm, empty for a server that bakes by itself."""
 
-    #: workers that the cells still to be baked are worth
-    wanted: int
+    #: workers of each kind that the cells still to be baked are worth
+    wanted: dict[str, int]
     #: cells still to be baked
     left: int
     workers: list[Worker]
@@ -47,8 +47,9 @@ def farm(service: Service) -> Farm:
     """List the farm's workers."""
     known = service.farm
     if known is None:
-        return Farm(wanted=0, left=0, workers=[])
+        return Farm(wanted={"cpu": 0, "gpu": 0}, left=0, workers=[])
     aside = known.aside()
+    wanted = {"cpu": 0, "gpu": 0, service.settings.device: known.wanted()}
     workers = [
         Worker(
             worker=slot.worker,
@@ -65,4 +66,4 @@ def farm(service: Service) -> Farm:
         )
         for slot in known.slots()
     ]
-    return Farm(wanted=known.wanted(), left=known.left(), workers=workers)
+    return Farm(wanted=wanted, left=known.left(), workers=workers)
