@@ -44,7 +44,7 @@ def test_a_scene_is_prepared(client: TestClient) -> None:
     assert body["triangles"] == 2
     assert body["bounds"] == {"min": [-100.0, 0.0, -100.0], "max": [100.0, 0.0, 100.0]}
     assert body["notes"] == ["One line primitive was left out."]
-    assert client.get("scenes").json() == {"scenes": [body]}
+    assert client.get("scenes").json() == {"scenes": [body], "next": None}
 
 
 def test_the_prepared_scene_can_be_read_and_nothing_beside_it(client: TestClient) -> None:
@@ -161,7 +161,7 @@ def test_planning_needs_a_prepared_scene(client: TestClient) -> None:
     ("change", "word"),
     [
         ({"scene": "nosuchscene"}, "no scene"),
-        ({"corridor": "nosuchcorridor"}, "nosuchcorridor"),
+        ({"corridor": "0123456789abcdef"}, "no corridor"),
         ({"corridor": "../../../etc/passwd"}, "corridor"),
         ({"corridor": {}}, "exactly one"),
         ({"settings": {"layers": 0}}, "layers"),

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated
 
 from fastapi import Path
 
 _ID = r"^[a-z0-9](?:[a-z0-9-]{0,62}[a-z0-9])?$"
+IS_ID = re.compile(_ID)
 _BLOB = r"^[0-9a-f]{32}\.[a-z0-9]{2,5}$"
 
 SceneId = Annotated[str, Path(pattern=_ID, description="A scene's id.")]

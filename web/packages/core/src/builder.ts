@@ -4,6 +4,12 @@ import { FarfieldError, asError, AbortedError } from './errors.js';
 import type { CellFile, NearReference, Vec3 } from './format.js';
 import { WALK_VERSION } from './format.js';
 import { buildNearBatches, type NearBatch, type NearSource } from './near.js';
+import {
+  findObjects,
+  type FindOptions,
+  type FoundObjects,
+  type Triangles,
+} from './objects/find-objects.js';
 import { buildQuadVertices, type QuadVertices } from './quads.js';
 import { buildSolid, type SolidData } from './solid.js';
 
@@ -26,6 +32,8 @@ export interface CellBuilder {
   cell(bytes: ArrayBuffer, resolution: number): Promise<BuiltCell>;
   /** Build the near field of the cell of `size` at `centre`. */
   near(sources: readonly NearSource[], centre: Vec3, size: Vec3): Promise<BuiltNear>;
+  /** Find the objects of a near field; the caller keeps its arrays. */
+  objects(batches: readonly Triangles[], options: FindOptions): Promise<FoundObjects>;
   dispose(): void;
 }
 
@@ -64,6 +72,10 @@ export class InlineBuilder implements CellBuilder {
     return Promise.resolve(buildNear(sources, centre, size));
   }
 
+  async objects(batches: readonly Triangles[], options: FindOptions): Promise<FoundObjects> {
+    return Promise.resolve(findObjects(batches, options));
+  }
+
   dispose(): void {
     return;
   }
@@ -71,10 +83,11 @@ export class InlineBuilder implements CellBuilder {
 
 export type BuildRequest =
   | { id: number; kind: 'cell'; bytes: ArrayBuffer; resolution: number }
-  | { id: number; kind: 'near'; sources: readonly NearSource[]; centre: Vec3; size: Vec3 };
+  | { id: number; kind: 'near'; sources: readonly NearSource[]; centre: Vec3; size: Vec3 }
+  | { id: number; kind: 'objects'; batches: readonly Triangles[]; options: FindOptions };
 
 export type BuildReply =
-  { id: number; value: BuiltCell | BuiltNear } | { id: number; error: string };
+  { id: number; value: BuiltCell | BuiltNear | FoundObjects } | { id: number; error: string };
 
 interface Waiting {
   readonly resolve: (value: never) => void;
@@ -109,12 +122,16 @@ export class WorkerBuilder implements CellBuilder {
     return this.ask({ id: this.next++, kind: 'near', sources, centre, size }, []);
   }
 
+  objects(batches: readonly Triangles[], options: FindOptions): Promise<FoundObjects> {
+    return this.ask({ id: this.next++, kind: 'objects', batches, options }, []);
+  }
+
   dispose(): void {
     this.worker.terminate();
     this.fail(new AbortedError());
   }
 
-  private ask<T extends BuiltCell | BuiltNear>(
+  private ask<T extends BuiltCell | BuiltNear | FoundObjects>(
     request: BuildRequest,
     transfer: Transferable[],
   ): Promise<T> {
@@ -139,6 +156,13 @@ export function answer(request: BuildRequest): { reply: BuildReply; transfer: Ar
       return {
         reply: { id: request.id, value },
         transfer: [positions.buffer, texels.buffer, indices.buffer],
+      };
+    }
+    if (request.kind === 'objects') {
+      const value = findObjects(request.batches, request.options);
+      return {
+        reply: { id: request.id, value },
+        transfer: value.batches.map(({ indices }) => indices.buffer),
       };
     }
     const value = buildNear(request.sources, request.centre, request.size);

@@ -14,6 +14,7 @@ export * from './lru-cache.js';
 export * from './manifest.js';
 export * from './near.js';
 export * from './near-material.js';
+export * from './objects/index.js';
 export * from './prefetch.js';
 export * from './quads.js';
 export * from './shared-store.js';

@@ -11,6 +11,9 @@ import type { Vec3 } from './format.js';
 import { parseGlb, readAccessor, type AccessorView, type Glb } from './glb.js';
 import { readMaterial, stateKey, type NearMaterial, type NearState } from './near-material.js';
 
+/** Near polygons are drawn up to this multiple of `near_field`, so that no crack opens there. */
+export const NEAR_OVERLAP = 17 / 16;
+
 /** Triangles of one draw state. */
 export interface NearBatch {
   readonly state: NearState;

@@ -26,6 +26,8 @@ import {
 } from 'three';
 import type { CellView } from './cell-view.js';
 import { MotionTracker } from './motion.js';
+import type { ImpostorOptions } from './objects/object-impostor.js';
+import { WalkObjects, type NearImpostors } from './objects/walk-objects.js';
 import { Stage } from './stage.js';
 import { readStats, type WalkStats } from './stats.js';
 
@@ -46,6 +48,8 @@ export interface WalkOptions {
   readonly backgroundAlpha?: number;
   /** Downloads; share one between walks to share its limit of requests. */
   readonly queue?: FetchQueue;
+  /** Whether costly objects of the near field are drawn as impostors. Default 'never'. */
+  readonly nearImpostors?: NearImpostors;
 }
 
 export interface WalkEvents {
@@ -79,6 +83,8 @@ export class Walk extends EventDispatcher<WalkEvents> {
   frozen = false;
   /** Draw cells; the sky is drawn without them too. */
   visible = true;
+  /** Object impostors: what was placed with `add`, and objects of the near field. */
+  readonly objects: WalkObjects;
   private readonly options: WalkOptions;
   private readonly queue: FetchQueue;
   private readonly builder: CellBuilder;
@@ -99,6 +105,12 @@ export class Walk extends EventDispatcher<WalkEvents> {
     this.options = options;
     this.queue = options.queue ?? new FetchQueue();
     this.builder = createBuilder();
+    this.objects = new WalkObjects({
+      renderer: options.renderer,
+      builder: this.builder,
+      group: this.group,
+      near: options.nearImpostors ?? 'never',
+    });
     this.alpha = { value: options.backgroundAlpha ?? 1 };
     this.loaded = this.load();
     this.loaded.catch((error: unknown) => {
@@ -115,20 +127,8 @@ export class Walk extends EventDispatcher<WalkEvents> {
     this.camera = camera;
   }
 
-  /** Put an object of your own into the walk, in the scene's coordinates. */
-  add(object: Object3D): this {
-    this.group.add(object);
-    return this;
-  }
-
-  /** Take an object out again. */
-  remove(object: Object3D): this {
-    this.group.remove(object);
-    return this;
-  }
-
-  /** Call once a frame, before drawing. */
-  update(): void {
+  /** Call once a frame, before drawing; `now` is the time for fades, in seconds. */
+  update(now = performance.now() / 1000): void {
     const { stage, camera, index } = this;
     if (stage === undefined || camera === undefined || index === undefined) return;
     camera.updateWorldMatrix(true, false);
@@ -150,6 +150,20 @@ export class Walk extends EventDispatcher<WalkEvents> {
     this.showCells();
     stage.uploads.frame(this.options.uploadBytes ?? MEGABYTE);
     stage.attributes.update();
+    this.objects.update(this.view, this.manifest?.walk.near_field ?? Infinity, camera, now);
+  }
+
+  /**
+   * Place an object in the walk, in its coordinates: it is drawn as an impostor while a picture of
+   * it is good enough, and moves, turns and is animated like any other.
+   */
+  add(object: Object3D, options?: ImpostorOptions): void {
+    this.objects.add(object, options);
+  }
+
+  /** Take an object out of the walk. */
+  remove(object: Object3D): void {
+    this.objects.remove(object);
   }
 
   /** Make a change of `visible` count before the next `update`. */
@@ -226,6 +240,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
     domElement.removeEventListener('webglcontextlost', this.onContextLost);
     domElement.removeEventListener('webglcontextrestored', this.onContextRestored);
     if (typeof window !== 'undefined') window.removeEventListener('online', this.onOnline);
+    this.objects.dispose();
     this.stage?.dispose();
     this.stage = undefined;
     this.builder.dispose();
@@ -299,6 +314,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
 
   private readonly onContextLost = (event: Event): void => {
     event.preventDefault();
+    this.objects.forget();
     // Everything on the graphics card is gone, and can only be let go of before a new context comes.
     this.stage?.dispose();
     this.stage = undefined;

@@ -117,7 +117,7 @@ describe('NearMaterials', () => {
     expect(textured.defines).toEqual({ MAP: '', MASK: '' });
     expect(materials.get({ ...STATE, map, alpha: 'mask' }, second)).toBe(textured);
     expect(textured.uniforms.ff_map.value).toBe(second);
-    expect(textured.uniforms.ff_near_field.value).toBe(20);
+    expect(textured.uniforms.ff_near_field.value).toBe(21.25);
     expect(textured.uniforms.ff_sun).toBe(plain.uniforms.ff_sun);
     materials.dispose();
   });
