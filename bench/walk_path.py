@@ -2,11 +2,11 @@
 
     python -m bench.walk --path [--json] [--keep] [--quick]
 
-Figure 8 is the frame time of the walk and of the full model along the path, figure 9 the polygons
-drawn: near, far and in all; rules mark where another cell is shown. The path goes down the corridor,
-across and back, 2,197 frames as in the paper, looking ahead. Both models are drawn in turn from every
-place. The pictures and the recorded path, which the page plays with `?path=`, go to bench/results or
-to the folder FARFIELD_FIGURES.
+Figure 8 is the frame time of the walk and of the full model along the path, figure 9 the
+polygons drawn: near, far and in all; rules mark where another cell is shown. The path goes down
+the corridor, across and back, 2,197 frames as in the paper, looking ahead. Both models are
+drawn in turn from every place. The pictures and the recorded path, which the page plays with
+`?path=`, go to bench/results or to the folder FARFIELD_FIGURES.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""bench.walk: its paths by reckoning, how it measures on the painted room, all of it in the soak."""
+"""bench.walk: paths by reckoning, measuring on the painted room, all of it in the soak."""
 
 from __future__ import annotations
 
