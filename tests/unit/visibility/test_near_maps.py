@@ -8,8 +8,8 @@ from farfield_core.faces import directions, texel_centres
 from farfield_core.scene import PreparedScene
 from farfield_worker.near import near_triangles
 from farfield_worker.visibility.far_texels import FarTexels
-from farfield_worker.visibility.from_region import cell_eyes, farthest_around
-from farfield_worker.visibility.near_maps import NearMap, NearMapRenderer
+from farfield_worker.visibility.from_region import cell_eyes
+from farfield_worker.visibility.near_maps import NearMap, NearMapRenderer, farthest_around
 from farfield_worker.visibility.near_triangles import NearTriangles
 from farfield_worker.visibility.sampling import (
     EFFORTS,

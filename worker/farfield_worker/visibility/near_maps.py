@@ -90,6 +90,13 @@ class NearMap(NamedTuple):
     triangle: NDArray[np.int32]
 
 
+def farthest_around(solid: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Least disparity in the 3 x 3 texels around each of a map (h, w): (h, w) float32."""
+    grown = np.pad(solid, 1, mode="edge")
+    rows = np.minimum(np.minimum(grown[:-2], grown[1:-1]), grown[2:])
+    return np.asarray(np.minimum(np.minimum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:]))
+
+
 class NearMapRenderer:
     """Draws near maps. Create it in the process that uses it, never before a fork."""
 

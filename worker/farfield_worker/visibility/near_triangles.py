@@ -18,8 +18,7 @@ from farfield_core.scene import PreparedScene
 from numba import njit
 from numpy.typing import NDArray
 
-from farfield_worker.visibility.from_region import farthest_around
-from farfield_worker.visibility.near_maps import NearMap
+from farfield_worker.visibility.near_maps import NearMap, farthest_around
 
 Floats = NDArray[np.float64]
 
