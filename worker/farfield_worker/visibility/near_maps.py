@@ -27,8 +27,6 @@ from farfield_worker.visibility.depth_maps import NEAREST
 
 Floats = NDArray[np.float64]
 
-#: triangles drawn before the others are tested against what is drawn already
-FIRST = 20_000
 #: mean opacity of a texel's area from which it counts as opaque all over
 SOLID = 0.95
 
@@ -124,8 +122,7 @@ class NearMapRenderer:
         _, right, down, forward = FACES[face]
         view = self._near.in_view(eye, face, NEAREST, self.resolution)
         opaque = self._opaque[self._near.runs[view.cluster, 0]]
-        rest, holey = view.take(opaque), view.take(~opaque)
-        some = int(np.searchsorted(np.cumsum(rest.triangles), FIRST)) + 1
+        solid, holey = view.take(opaque), view.take(~opaque)
         with gl.current() as context:
             self._framebuffer.use()
             context.enable_only(moderngl.DEPTH_TEST)
@@ -139,22 +136,17 @@ class NearMapRenderer:
                 near=NEAREST,
                 least_opacity=SOLID,
             )
-            ids = [np.full(1, -1, np.int32)]
-            ids.append(self._draw(context, rest.take(slice(some)), eye, face, 0))
-            rest = rest.take(slice(some, None))
-            if len(rest.cluster):
-                rest = self._near.not_hidden(rest, self._shown()[..., 0])
-                ids.append(self._draw(context, rest, eye, face, sum(map(len, ids)) - 1))
+            first = self._draw(context, solid, eye, face, 0)
+            ids = [np.full(1, -1, np.int32), first]
             if len(holey.cluster):
-                ids.append(self._draw(context, holey, eye, face, sum(map(len, ids)) - 1))
+                ids.append(self._draw(context, holey, eye, face, len(first)))
             shown = self._shown()
-            solid = shown[..., 0]
+            nearest = shown[..., 0]
             if len(holey.cluster):
                 self.buffers.set(least_opacity=0.0)
-                holey = self._near.not_hidden(holey, solid)
-                ids.append(self._draw(context, holey, eye, face, sum(map(len, ids)) - 1))
+                ids.append(self._draw(context, holey, eye, face, len(first) + len(ids[-1])))
                 shown = self._shown()
-        return NearMap(solid, np.concatenate(ids)[shown[..., 1].astype(np.int32)])
+        return NearMap(nearest, np.concatenate(ids)[shown[..., 1].astype(np.int32)])
 
     def close(self) -> None:
         """Free what the GPU holds."""
