@@ -88,17 +88,17 @@ COSTS: dict[str, dict[str, _Cost]] = {
         "texels": _Cost(value=356e3, layers=0.9, texels=2.0, triangles=0.0),
     },
     "slanted": {
-        "seconds": _Cost(value=7.0, layers=0.1, texels=0.8, triangles=0.3),
-        "bytes": _Cost(value=0.93e6, layers=0.44, texels=0.85, triangles=0.0),
-        "quads": _Cost(value=3.3e3, layers=0.5, texels=0.77, triangles=0.0),
-        "texels": _Cost(value=500e3, layers=0.44, texels=2.0, triangles=0.0),
+        "seconds": _Cost(value=4.6, layers=0.1, texels=0.8, triangles=0.3),
+        "bytes": _Cost(value=1.38e6, layers=0.44, texels=0.85, triangles=0.0),
+        "quads": _Cost(value=3.4e3, layers=0.5, texels=0.77, triangles=0.0),
+        "texels": _Cost(value=532e3, layers=0.44, texels=2.0, triangles=0.0),
     },
 }
 #: what visibility leaves of them, same cells; streets and rooms have less left, see
 #: docs/near-field.md
 SEEN: dict[str, dict[str, float]] = {
     "layers": {"seconds": 1.9, "bytes": 0.79, "quads": 0.84, "texels": 0.77},
-    "slanted": {"seconds": 1.0, "bytes": 1.0, "quads": 1.0, "texels": 1.0},
+    "slanted": {"seconds": 1.06, "bytes": 0.71, "quads": 0.97, "texels": 0.65},
 }
 #: near triangles that some eye sees, as a share of those inside
 SEEN_NEAR = 0.56
