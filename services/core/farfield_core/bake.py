@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections.abc import Iterator
 
 from farfield_shading import default_light
 
@@ -102,14 +103,18 @@ def relocate(walk: Walk, places: Places) -> Walk:
     return walk.model_copy(update={"places": places})
 
 
-def done_cells(store: Store, bake: str) -> set[Index]:
-    """Cells of a bake that exist."""
-    prefix, done = layout.cells_prefix(bake), set()
+def done_names(store: Store, bake: str) -> Iterator[str]:
+    """Names of a bake's cells that exist, one after the other."""
+    prefix = layout.cells_prefix(bake)
     for key in store.list(prefix):
         name, dot, suffix = key.removeprefix(prefix).partition(".")
         if dot and suffix == "json":
-            done.add(parse_cell_name(name))
-    return done
+            yield name
+
+
+def done_cells(store: Store, bake: str) -> set[Index]:
+    """Cells of a bake that exist."""
+    return {parse_cell_name(name) for name in done_names(store, bake)}
 
 
 def missing_cells(store: Store, walk: Walk) -> list[Index]:

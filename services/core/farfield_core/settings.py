@@ -46,6 +46,11 @@ class BakeSettings(BaseModel):
         default=1.0,
         description="how many texels two neighbouring layers may shift by; none means no bound",
     )
+    gap_fill: Literal["paper", "steep"] = Field(
+        default="steep",
+        description="gaps to fill: those between neighbouring layers only, as the paper does, or "
+        "those where a steep surface skips layers too",
+    )
     tolerance: Annotated[float, Field(gt=0, le=1)] = Field(
         default=0.68, description="share of the parallax bound that slanted quads use"
     )

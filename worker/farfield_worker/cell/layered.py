@@ -31,8 +31,6 @@ from farfield_worker.compile.quads import layer_quads
 from farfield_worker.render import Renderer, open_renderer
 from farfield_worker.visibility.far_texels import FarTexels
 
-#: a steep surface may pass this many layers from texel to texel and is still filled (`gaps`)
-REACH = 8
 #: layers in front of a texel's own that never hide it (visibility/far_texels.py)
 APART = 2
 
@@ -49,9 +47,9 @@ class LayeredImpostors:
         self._rules = Rules(
             walk.layers,
             walk.resolution,
-            REACH,
             settings.grower,
             gutter_free(min(walk.atlas.width, walk.atlas.height), GUTTER),
+            settings.gap_fill == "steep",
         )
         # One more layer inside the near field tells gap filling where surfaces come nearer still.
         inner = placement.place(

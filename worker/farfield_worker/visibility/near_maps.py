@@ -24,9 +24,12 @@ from farfield_worker.gl.programs import set_uniforms
 from farfield_worker.gl.scene_buffers import SceneBuffers
 from farfield_worker.visibility.clusters import Clusters, InView
 from farfield_worker.visibility.depth_maps import NEAREST
+from farfield_worker.visibility.pyramid import not_behind
 
 Floats = NDArray[np.float64]
 
+#: triangles drawn before the others are tested against what is drawn already
+FIRST = 20_000
 #: mean opacity of a texel's area from which it counts as opaque all over
 SOLID = 0.95
 
@@ -88,13 +91,6 @@ class NearMap(NamedTuple):
     triangle: NDArray[np.int32]
 
 
-def farthest_around(solid: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Least disparity in the 3 x 3 texels around each of a map (h, w): (h, w) float32."""
-    grown = np.pad(solid, 1, mode="edge")
-    rows = np.minimum(np.minimum(grown[:-2], grown[1:-1]), grown[2:])
-    return np.asarray(np.minimum(np.minimum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:]))
-
-
 class NearMapRenderer:
     """Draws near maps. Create it in the process that uses it, never before a fork."""
 
@@ -122,7 +118,8 @@ class NearMapRenderer:
         _, right, down, forward = FACES[face]
         view = self._near.in_view(eye, face, NEAREST, self.resolution)
         opaque = self._opaque[self._near.runs[view.cluster, 0]]
-        solid, holey = view.take(opaque), view.take(~opaque)
+        rest, holey = view.take(opaque), view.take(~opaque)
+        some = int(np.searchsorted(np.cumsum(rest.triangles), FIRST)) + 1
         with gl.current() as context:
             self._framebuffer.use()
             context.enable_only(moderngl.DEPTH_TEST)
@@ -136,17 +133,22 @@ class NearMapRenderer:
                 near=NEAREST,
                 least_opacity=SOLID,
             )
-            first = self._draw(context, solid, eye, face, 0)
-            ids = [np.full(1, -1, np.int32), first]
+            ids = [np.full(1, -1, np.int32)]
+            ids.append(self._draw(context, rest.take(slice(some)), eye, face, 0))
+            rest = rest.take(slice(some, None))
+            if len(rest.cluster):
+                rest = not_behind(rest, self._shown()[..., 0])
+                ids.append(self._draw(context, rest, eye, face, sum(map(len, ids)) - 1))
             if len(holey.cluster):
-                ids.append(self._draw(context, holey, eye, face, len(first)))
+                ids.append(self._draw(context, holey, eye, face, sum(map(len, ids)) - 1))
             shown = self._shown()
-            nearest = shown[..., 0]
+            solid = shown[..., 0]
             if len(holey.cluster):
                 self.buffers.set(least_opacity=0.0)
-                ids.append(self._draw(context, holey, eye, face, len(first) + len(ids[-1])))
+                holey = not_behind(holey, solid)
+                ids.append(self._draw(context, holey, eye, face, sum(map(len, ids)) - 1))
                 shown = self._shown()
-        return NearMap(nearest, np.concatenate(ids)[shown[..., 1].astype(np.int32)])
+        return NearMap(solid, np.concatenate(ids)[shown[..., 1].astype(np.int32)])
 
     def close(self) -> None:
         """Free what the GPU holds."""
@@ -180,3 +182,10 @@ class NearMapRenderer:
         """What is drawn so far: (h, w, 2) float32, disparity and number of the triangle from 1."""
         data = np.frombuffer(self._picture.read(), np.float32)
         return data.reshape(self.resolution, self.resolution, 2)
+
+
+def farthest_around(disparity: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Least disparity in the 3 x 3 texels around each of a map (h, w): (h, w) float32."""
+    grown = np.pad(disparity, 1, mode="edge")
+    rows = np.minimum(np.minimum(grown[:-2], grown[1:-1]), grown[2:])
+    return np.minimum(np.minimum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:])
