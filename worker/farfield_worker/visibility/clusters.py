@@ -16,7 +16,8 @@ from farfield_core.scene import PreparedScene
 from numba import njit
 from numpy.typing import NDArray
 
-from farfield_worker.visibility.raster import Tiles, draw_clusters, hidden
+from farfield_worker.visibility.cutouts import Cutouts
+from farfield_worker.visibility.raster import Tiles, draw_clusters
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -71,6 +72,7 @@ class Clusters:
         self._indices = np.asarray(scene.triangles)
         self._origin = scene.origin
         self._double_sided = np.array([b.double_sided for b in scene.info.batches], np.bool_)
+        self._cutouts = Cutouts.of(scene)
         self._batches = len(scene.info.batches)
         runs = [
             (part.batch, first, min(SIZE, part.first_triangle + part.triangles - first))
@@ -95,7 +97,7 @@ class Clusters:
         return InView(order, triangles, rect[order], disparity[order])
 
     def draw(self, clusters: InView, eye: Floats, face: int, nearest: float, tiles: Tiles) -> None:
-        """Draw all triangles of `clusters` beyond Z = `nearest` into `tiles`, as if opaque."""
+        """Draw all triangles of `clusters` beyond Z = `nearest` into `tiles`."""
         draw_clusters(
             self._positions,
             self._indices,
@@ -103,6 +105,7 @@ class Clusters:
             clusters.rect,
             clusters.disparity,
             ~self._double_sided,
+            self._cutouts,
             np.asarray(eye, np.float64) - self._origin,
             _axes(face),
             nearest,
@@ -111,14 +114,6 @@ class Clusters:
             tiles.floor,
             tiles.stale,
         )
-
-    def not_hidden(self, clusters: InView, tiles: Tiles) -> InView:
-        """Those of `clusters` that what is drawn in `tiles` may not hide."""
-        keep = [
-            not hidden(rect, nearest, tiles.disparity, tiles.floor, tiles.stale)
-            for rect, nearest in zip(clusters.rect, clusters.disparity, strict=True)
-        ]
-        return clusters.take(np.array(keep, np.bool_))
 
     def by_batch(self, triangles: Ints) -> ByBatch:
         """Group `triangles` (n,), the scene's indices, by batch."""
