@@ -16,7 +16,7 @@ from farfield_core.scene import PreparedScene
 from numba import njit
 from numpy.typing import NDArray
 
-from farfield_worker.visibility.cutouts import Cutouts
+from farfield_worker.visibility.cutouts import OPAQUE, Cutouts
 from farfield_worker.visibility.raster import Tiles, draw_clusters
 
 Floats = NDArray[np.float64]
@@ -98,22 +98,28 @@ class Clusters:
 
     def draw(self, clusters: InView, eye: Floats, face: int, nearest: float, tiles: Tiles) -> None:
         """Draw all triangles of `clusters` beyond Z = `nearest` into `tiles`."""
-        draw_clusters(
-            self._positions,
-            self._indices,
-            self.runs[clusters.cluster],
-            clusters.rect,
-            clusters.disparity,
-            ~self._double_sided,
-            self._cutouts,
-            np.asarray(eye, np.float64) - self._origin,
-            _axes(face),
-            nearest,
-            tiles.disparity,
-            tiles.triangle,
-            tiles.floor,
-            tiles.stale,
-        )
+        opaque = self._cutouts.kind[self.runs[clusters.cluster, 0]] == OPAQUE
+        # what has holes comes last, when most of it is hidden
+        for part, cutouts in ((opaque, None), (~opaque, self._cutouts)):
+            if not part.any():
+                continue
+            some = clusters.take(part)
+            draw_clusters(
+                self._positions,
+                self._indices,
+                self.runs[some.cluster],
+                some.rect,
+                some.disparity,
+                ~self._double_sided,
+                cutouts,
+                np.asarray(eye, np.float64) - self._origin,
+                _axes(face),
+                nearest,
+                tiles.disparity,
+                tiles.triangle,
+                tiles.floor,
+                tiles.stale,
+            )
 
     def by_batch(self, triangles: Ints) -> ByBatch:
         """Group `triangles` (n,), the scene's indices, by batch."""

@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from farfield_worker.visibility.cutouts import DITHER, OPAQUE, dithered, opacity
+from farfield_worker.visibility.cutouts import DITHER, dithered, opacity
 
 #: texels across a tile
 TILE = 8
@@ -64,15 +64,16 @@ def draw_clusters(
     """Draw clusters `runs` (k, 3), batch, first triangle, triangles, nearest first.
 
     `rects` (k, 4) and `nearest_of` (k,) are the texels that their bounds cover and the greatest
-    disparity of the bounds. `one_sided` says of each batch whether back faces are dropped; `eye`
-    (3,) is relative to the scene's origin, `axes` (3, 3) are right, down, forward. Nothing nearer
-    than Z = `nearest` is drawn. The last four are those of `Tiles`.
+    disparity of the bounds. `one_sided` says of each batch whether back faces are dropped;
+    `cutouts` are the materials' opacities, or None where all batches are opaque: numba then
+    compiles a faster kernel. `eye` (3,) is relative to the scene's origin, `axes` (3, 3) are right,
+    down, forward. Nothing nearer than Z = `nearest` is drawn. The last four are those of `Tiles`.
     """
     resolution = len(disparity)
     half = 0.5 * resolution
     # right, down, forward, and texture coordinates and opacity; then column, row, disparity and
     # the same times disparity
-    view = np.empty((3, 6))
+    view = np.zeros((3, 6))
     clipped = np.empty((4, 6))
     corner = np.empty((3, 6))
     slopes = np.empty((2, 4))
@@ -80,7 +81,7 @@ def draw_clusters(
         if hidden(rects[r], nearest_of[r], disparity, floor, stale):
             continue
         batch = runs[r, 0]
-        drop, holes = one_sided[batch], cutouts.kind[batch] != OPAQUE
+        drop = one_sided[batch]
         for t in range(runs[r, 1], runs[r, 1] + runs[r, 2]):
             left = right = above = below = True
             near, far = np.inf, -np.inf
@@ -98,26 +99,39 @@ def draw_clusters(
                 above, below = above and b < -c, below and b > c
             if far < nearest or left or right or above or below:
                 continue
-            if holes:
+            if cutouts is not None:
                 for i in range(3):
                     v = indices[t, i]
                     view[i, 3], view[i, 4] = cutouts.uvs[v, 0], cutouts.uvs[v, 1]
                     view[i, 5] = cutouts.colors[v, 3] / 65535.0
-            count = 3
             if near >= nearest:
-                clipped[:3] = view
-            else:
-                count = _clip(view, nearest, clipped)
-            for k in range(count):
-                d = 1.0 / clipped[k, 2]
-                clipped[k, 0] = (clipped[k, 0] * d + 1.0) * half
-                clipped[k, 1] = (clipped[k, 1] * d + 1.0) * half
-                clipped[k, 2] = d
-                for a in range(3, 6):
-                    clipped[k, a] *= d
+                for i in range(3):
+                    d = 1.0 / view[i, 2]
+                    corner[i, 0] = (view[i, 0] * d + 1.0) * half
+                    corner[i, 1] = (view[i, 1] * d + 1.0) * half
+                    corner[i, 2] = d
+                    if cutouts is not None:
+                        for a in range(3, 6):
+                            corner[i, a] = view[i, a] * d
+                _fill(corner, slopes, drop, t, batch, cutouts, disparity, triangle, stale)
+                continue
+            count = _clip(view, nearest, clipped)
+            _project(clipped, count, half)
             for k in range(1, count - 1):
                 corner[0], corner[1], corner[2] = clipped[0], clipped[k], clipped[k + 1]
-                _fill(corner, slopes, drop, t, holes, batch, cutouts, disparity, triangle, stale)
+                _fill(corner, slopes, drop, t, batch, cutouts, disparity, triangle, stale)
+
+
+@njit(cache=True)
+def _project(corners: Any, count: int, half: float) -> None:
+    """Turn right, down, forward into column, row, disparity, and scale the rest by disparity."""
+    for k in range(count):
+        d = 1.0 / corners[k, 2]
+        corners[k, 0] = (corners[k, 0] * d + 1.0) * half
+        corners[k, 1] = (corners[k, 1] * d + 1.0) * half
+        corners[k, 2] = d
+        for a in range(3, 6):
+            corners[k, a] *= d
 
 
 @njit(cache=True)
@@ -155,20 +169,19 @@ def _clip(view: Any, nearest: float, out: Any) -> int:
     return count
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _fill(
     c: Any,
     slopes: Any,
     one_sided: bool,
     t: int,
-    holes: bool,
     batch: int,
     cutouts: Any,
     disparity: Any,
     triangle: Any,
     stale: Any,
 ) -> None:
-    """Draw triangle `t` with corners `c` (3, 6), see `draw_clusters`; `batch` may have `holes`.
+    """Draw triangle `t` with corners `c` (3, 6), see `draw_clusters`.
 
     `slopes` (2, 4) is scratch: change of the last four along columns and rows.
     """
@@ -185,7 +198,7 @@ def _fill(
     # rows run down, so a front face, counter-clockwise seen from the eye, has a negative area
     if area == 0.0 or (one_sided and area > 0.0):
         return
-    for a in range(4 if holes else 1):
+    for a in range(1 if cutouts is None else 4):
         d1, d2 = c[1, a + 2] - c[0, a + 2], c[2, a + 2] - c[0, a + 2]
         slopes[0, a], slopes[1, a] = (d1 * y2 - d2 * y1) / area, (d2 * x1 - d1 * x2) / area
     dx, dy = slopes[0, 0], slopes[1, 0]
@@ -203,8 +216,9 @@ def _fill(
             # slivers have no slope worth the name: keep to what the corners have
             d = np.float32(min(max(base + column * dx, least), most))
             if d > disparity[row, column]:
-                if holes and not _drawn(c, slopes, batch, cutouts, column, row):
-                    continue
+                if cutouts is not None:  # noqa: SIM102 - numba drops this branch as it stands
+                    if not _drawn(c, slopes, batch, cutouts, column, row):
+                        continue
                 disparity[row, column] = d
                 triangle[row, column] = t
                 drawn = True
