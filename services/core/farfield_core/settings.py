@@ -46,6 +46,11 @@ class BakeSettings(BaseModel):
         default=1.0,
         description="how many texels two neighbouring layers may shift by; none means no bound",
     )
+    gap_fill: Literal["paper", "steep"] = Field(
+        default="steep",
+        description="gaps to fill: those between neighbouring layers only, as the paper does, or "
+        "those where a steep surface skips layers too",
+    )
     tolerance: Annotated[float, Field(gt=0, le=1)] = Field(
         default=0.68, description="share of the parallax bound that slanted quads use"
     )
@@ -57,8 +62,10 @@ class BakeSettings(BaseModel):
     grower: Literal["greedy", "best"] = Field(
         default="best", description="how texels are gathered into quads"
     )
-    visibility: Literal["on", "off"] = Field(
-        default="on", description="leave out what no eye in the cell can see"
+    visibility: Literal["on", "off", "fast", "careful"] = Field(
+        default="on",
+        description="leave out what no eye in the cell can see; fast and careful sample fewer and "
+        "more eyes",
     )
     encoder: Literal["png", "webp"] = Field(default="png", description="format of atlas pages")
     supersample: int = Field(

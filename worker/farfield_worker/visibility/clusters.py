@@ -8,6 +8,7 @@ away, or slip between texel centres. All tests are conservative: what is dropped
 
 from __future__ import annotations
 
+import copy
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -95,6 +96,14 @@ class Clusters:
         order = shown[np.argsort(-disparity[shown], kind="stable")].astype(np.int32)
         triangles = self.runs[order, 2].astype(np.int32)
         return InView(order, triangles, rect[order], disparity[order])
+
+    def meeting(self, centre: Floats, half_width: float) -> Clusters:
+        """Those whose bounds meet the cube around `centre` (3,), relative to the scene's origin."""
+        low, high = self._bounds[:, 0], self._bounds[:, 1]
+        meets = ((low <= centre + half_width) & (high >= centre - half_width)).all(axis=1)
+        some = copy.copy(self)
+        some.runs, some._bounds = self.runs[meets], self._bounds[meets]
+        return some
 
     def draw(self, clusters: InView, eye: Floats, face: int, nearest: float, tiles: Tiles) -> None:
         """Draw all triangles of `clusters` beyond Z = `nearest` into `tiles`."""
