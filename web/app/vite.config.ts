@@ -12,7 +12,9 @@ export default defineConfig({
     chunkSizeWarningLimit: 600, // three.js in one piece
     rolldownOptions: {
       input: { index: 'index.html', walk: 'walk/index.html', objects: 'objects/index.html' },
-      output: { codeSplitting: { groups: [{ name: 'three', test: /node_modules\/three\/build\// }] } },
+      output: {
+        codeSplitting: { groups: [{ name: 'three', test: /node_modules\/three\/build\// }] },
+      },
     },
   },
 });

@@ -21,6 +21,7 @@ COMMANDS = {
     "serve": "Serve the API, the pages and baking.",
     "demo": "Bake a corridor and open the walk while it bakes.",
     "worker": "Bake cells for a farm.",
+    "bake-object": "Bake one model as an object impostor.",
 }
 
 
@@ -35,7 +36,7 @@ class Commands(click.Group):
         """The command of that name."""
         if cmd_name not in COMMANDS:
             return None
-        command = importlib.import_module(f"farfield.commands.{cmd_name}").command
+        command = importlib.import_module(f"farfield.commands.{cmd_name.replace('-', '_')}").command
         assert isinstance(command, click.Command)
         return command
 
