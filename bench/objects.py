@@ -213,9 +213,9 @@ def stones(browser: Browser, server: WalkServer) -> dict[str, Any]:
     for kind in times:
         one.call("objects.hooks.use(args[0]); objects.stand.measure(0, 1, 0.1)", kind)
     for turn in range(4):
-        for kind, values in times.items():
+        for kind in times:
             one.call("objects.hooks.use(args[0])", kind)
-            values += one.call("return objects.stand.measure(args[0], 2, 0.5)", turn)
+            times[kind] += one.call("return objects.stand.measure(args[0], 2, 0.5)", turn)
     close(one)
     median = {name: float(np.median(values)) for name, values in times.items()}
     return {"true_ratio": median["impostor"] / median["mesh"], "true_ms": median}
