@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections.abc import Iterator
 
 from farfield_shading import default_light
 
@@ -17,7 +18,7 @@ from farfield_core import walk as walk_format
 from farfield_core.cells import CellGrid, Index, parse_cell_name
 from farfield_core.corridor import Corridor, Ground, cut
 from farfield_core.errors import BadInputError
-from farfield_core.ground import ground_of
+from farfield_core.ground import ground_under
 from farfield_core.placement import Placement
 from farfield_core.scene import SceneInfo
 from farfield_core.scenes import open_prepared
@@ -53,7 +54,7 @@ def create_bake(
     if store.exists(layout.walk_key(identity)):
         return read_walk(store, identity)
     if corridor.follow_ground and ground is None:
-        ground = ground_of(open_prepared(store, scene.id))
+        ground = ground_under(open_prepared(store, scene.id), corridor)
     grid = cut(corridor, settings.cell_size, ground)
     tables = cell_table_pages(grid)
     placement = settings.place() if settings.quads == "layers" else Placement((), ())
@@ -102,14 +103,18 @@ def relocate(walk: Walk, places: Places) -> Walk:
     return walk.model_copy(update={"places": places})
 
 
-def done_cells(store: Store, bake: str) -> set[Index]:
-    """Cells of a bake that exist."""
-    prefix, done = layout.cells_prefix(bake), set()
+def done_names(store: Store, bake: str) -> Iterator[str]:
+    """Names of a bake's cells that exist, one after the other."""
+    prefix = layout.cells_prefix(bake)
     for key in store.list(prefix):
         name, dot, suffix = key.removeprefix(prefix).partition(".")
         if dot and suffix == "json":
-            done.add(parse_cell_name(name))
-    return done
+            yield name
+
+
+def done_cells(store: Store, bake: str) -> set[Index]:
+    """Cells of a bake that exist."""
+    return {parse_cell_name(name) for name in done_names(store, bake)}
 
 
 def missing_cells(store: Store, walk: Walk) -> list[Index]:

@@ -1,7 +1,7 @@
 """What a bake is wanted to do, and how it failed: kept in the store, beside its cells.
 
-    bakes/<bake>/control.json               what was asked for last, or how the bake failed
-    bakes/<bake>/failures/<i>_<j>_<k>.json  a farm worker's word that it cannot bake a cell
+    bakes/<bake>/control.json                     what was asked for last, or how the bake failed
+    bakes/<bake>/attempts/<i>_<j>_<k>/<name>.json  how a farm worker failed to bake a cell
 
 The cells themselves tell what is done, so a server may be killed at any time and whoever comes next
 reads the same. A bake without control.json, made by the command line, waits to be resumed.
@@ -9,8 +9,8 @@ reads the same. A bake without control.json, made by the command line, waits to 
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
+import secrets
+from collections.abc import Container, Iterator, Mapping
 from datetime import UTC, datetime
 from typing import Literal
 
@@ -67,25 +67,39 @@ def write_control(
     return control
 
 
-def _failures_prefix(bake: str) -> str:
-    return f"{layout.bake_prefix(bake)}failures/"
+class Attempt(BaseModel):
+    """Who tried to bake a cell in vain, and what went wrong."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    worker: str
+    reason: str
 
 
-def write_failure(store: Store, bake: str, cell: str, reason: str) -> None:
-    """A farm worker gives up a cell."""
-    key = f"{_failures_prefix(bake)}{cell_name(parse_cell_name(cell))}.json"
-    store.put(key, json.dumps({"reason": reason}).encode())
+def _attempts_prefix(bake: str) -> str:
+    return f"{layout.bake_prefix(bake)}attempts/"
 
 
-def read_failures(store: Store, bake: str) -> dict[str, str]:
-    """Cells that farm workers gave up, and why."""
-    prefix = _failures_prefix(bake)
-    return {
-        key.removeprefix(prefix).removesuffix(".json"): str(json.loads(store.get(key))["reason"])
-        for key in store.list(prefix)
-    }
+def write_attempt(store: Store, bake: str, cell: str, attempt: Attempt) -> str:
+    """A farm worker failed to bake a cell; returns the attempt's name."""
+    name = secrets.token_hex(8)
+    key = f"{_attempts_prefix(bake)}{cell_name(parse_cell_name(cell))}/{name}.json"
+    store.put_new(key, attempt.model_dump_json().encode())
+    return name
 
 
-def forget_failures(store: Store, bake: str) -> None:
+def read_attempts(
+    store: Store, bake: str, known: Container[str] = ()
+) -> Iterator[tuple[str, str, Attempt]]:
+    """Cell, name and story of each attempt that failed, but for names in `known`."""
+    prefix = _attempts_prefix(bake)
+    for key in store.list(prefix):
+        cell, _, file = key.removeprefix(prefix).partition("/")
+        name = file.removesuffix(".json")
+        if name not in known:
+            yield cell, name, parse(Attempt, store.get(key), f"The attempt {key}")
+
+
+def forget_attempts(store: Store, bake: str) -> None:
     """Let given-up cells be tried again."""
-    store.delete_prefix(_failures_prefix(bake))
+    store.delete_prefix(_attempts_prefix(bake))

@@ -1,7 +1,7 @@
 """Where everything is kept: a folder, memory or S3, behind one small class.
 
 Objects are immutable and made create-only, the one primitive that folders, memory and S3 share
-(compare-and-swap, attributes and signed links do not exist on folders, so nothing here needs them).
+(compare-and-swap and attributes do not exist on folders, so nothing here needs them).
 A write shows up whole or not at all.
 """
 
@@ -10,8 +10,9 @@ from __future__ import annotations
 import re
 import secrets
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from datetime import timedelta
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -20,6 +21,7 @@ from obstore import exceptions
 from obstore.store import LocalStore, MemoryStore, ObjectStore, S3Store
 
 from farfield_core.errors import BadInputError, FarfieldError, NotFoundError
+from farfield_core.s3 import repeated, s3_clients
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")
 # obstore keeps names ending in '#<number>' for its own unfinished files
@@ -61,27 +63,43 @@ class Store:
             (a memory store cannot be opened twice).
     """
 
-    def __init__(self, objects: ObjectStore, url: str, root: Path | None = None) -> None:
+    def __init__(
+        self,
+        objects: ObjectStore,
+        url: str,
+        root: Path | None = None,
+        bulk: ObjectStore | None = None,
+        patience: float = 0.0,
+    ) -> None:
         self._objects = objects
+        self._bulk = bulk or objects  # for files and lists, which take their time
         self._root = root
+        self._patience = patience
         self.url = url
 
     @classmethod
     def open(
-        cls, place: str | Path, *, create: bool = True, options: Mapping[str, Any] | None = None
+        cls,
+        place: str | Path,
+        *,
+        create: bool = True,
+        options: Mapping[str, Any] | None = None,
+        patience: float = 10.0,
     ) -> Store:
         """Open the store at a folder, `file://...`, `memory://` or `s3://bucket/prefix`.
 
         A folder that does not exist is created, or raises NotFoundError without `create`.
         Credentials and the endpoint of S3 are taken from the usual AWS_* variables; `options`
-        overrides them. Raises BadInputError for any other address.
+        overrides them. A server that fails or is gone is asked again for `patience` seconds. Raises
+        BadInputError for any other address.
         """
         text = str(place)
         if text.startswith("memory://"):
             return cls(MemoryStore(), "memory://")
         if text.startswith("s3://"):
             with _mapped(text):
-                return cls(S3Store.from_url(text, **dict(options or {})), text)
+                objects, bulk = s3_clients(text, patience, options)
+                return cls(objects, text, None, bulk, patience)
         if text.startswith("file://"):
             text = text.removeprefix("file://")
         elif _SCHEME.match(text):
@@ -108,7 +126,11 @@ class Store:
                 return _copy_new(data, target)
             try:
                 # parts cannot be put create-only: S3 takes up to 5 GB in one piece
-                obstore.put(self._objects, key, data, mode="create", use_multipart=False)
+                self._write(
+                    lambda: obstore.put(
+                        self._client(data), key, data, mode="create", use_multipart=False
+                    )
+                )
             except exceptions.AlreadyExistsError:
                 return False
         return True
@@ -122,13 +144,28 @@ class Store:
                 with _copied_beside(data, target) as part:
                     part.replace(target)
             else:
-                obstore.put(self._objects, key, data)
+                self._write(lambda: obstore.put(self._client(data), key, data))
 
     def get(self, key: str) -> bytes:
         """All bytes of an object; raises NotFoundError."""
         check_key(key)
         with _mapped(key):
             return bytes(obstore.get(self._objects, key).bytes())
+
+    def fetch(self, key: str, target: Path) -> None:
+        """Write an object to a file, piece by piece; raises NotFoundError."""
+        check_key(key)
+        with _mapped(key), target.open("wb") as file:
+            for piece in obstore.get(self._bulk, key).stream(min_chunk_size=8 << 20):
+                file.write(piece)
+
+    def signed(self, key: str, seconds: float) -> str | None:
+        """Address under which anyone can read an object for so long, None where there is none."""
+        check_key(key)
+        if not isinstance(self._objects, S3Store):
+            return None
+        with _mapped(key):
+            return obstore.sign(self._objects, "GET", key, timedelta(seconds=seconds))
 
     def get_range(self, key: str, start: int, end: int) -> bytes:
         """Bytes [start, end) of an object, cut off at its end.
@@ -162,7 +199,7 @@ class Store:
         if prefix:
             check_key(prefix[:-1])
         with _mapped(prefix or "store"):
-            for chunk in obstore.list(self._objects, prefix or None, chunk_size=1000):
+            for chunk in obstore.list(self._bulk, prefix or None, chunk_size=1000):
                 for meta in chunk:
                     yield str(meta["path"])
 
@@ -186,7 +223,7 @@ class Store:
         check_key(key)
         try:
             with _mapped(key):
-                obstore.delete(self._objects, key)
+                self._write(lambda: obstore.delete(self._objects, key))
         except NotFoundError:
             return
 
@@ -199,6 +236,12 @@ class Store:
         if folder is not None and folder.is_dir():
             _remove_empty_folders(folder)
         return len(keys)
+
+    def _client(self, data: bytes | Path) -> ObjectStore:
+        return self._bulk if isinstance(data, Path) or len(data) > 1 << 20 else self._objects
+
+    def _write(self, call: Callable[[], object]) -> None:
+        repeated(call, self._patience)
 
     def remove_if_empty(self) -> None:
         """Remove the store's folder if nothing was ever put into it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from farfield_core import layout
 from farfield_core.cells import CellGrid
+from farfield_core.errors import BadInputError
 from farfield_core.scene import Bounds, Triple
 from farfield_core.store import Store
 from farfield_core.validation import parse
@@ -51,19 +53,34 @@ def walk_grid(store: Store, walk: Walk) -> CellGrid:
     Cells are in baking order, those of a paged walk by their distance from its start.
     """
     grid = walk.grid
-    if grid.cells is not None:
-        tables = [grid.cells]
-    else:
-        prefix = layout.bake_prefix(walk.id)
-        tables = [parse(CellTable, store.get(prefix + page.href), page.href) for page in grid.pages]
-    index = np.concatenate([np.array([t.i, t.j, t.k], np.int32).T for t in tables])
-    y = np.concatenate([np.array(t.y, np.float64) for t in tables])
+    index = np.empty((grid.total, 3), np.int32)
+    y = np.empty(grid.total)
+    row = 0
+    # one page after the other: as Python's numbers a million cells would take half a gigabyte
+    for table in _tables(store, walk):
+        rows = slice(row, row := row + len(table.i))
+        if row > grid.total:
+            break
+        index[rows] = np.array([table.i, table.j, table.k], np.int32).T
+        y[rows] = table.y
+    if row != grid.total:
+        raise BadInputError(
+            f"Walk {walk.id} says that it has {grid.total} cells, but lists others."
+        )
     cells = CellGrid(np.array(grid.origin), np.array(grid.size), index, y)
     if grid.cells is not None:
         return cells
     distance = ((cells.centres() - np.array(walk.start.eye)) ** 2).sum(axis=1)
     order = np.argsort(distance, kind="stable")
     return CellGrid(cells.origin, cells.size, index[order], y[order])
+
+
+def _tables(store: Store, walk: Walk) -> Iterator[CellTable]:
+    if walk.grid.cells is not None:
+        yield walk.grid.cells
+    prefix = layout.bake_prefix(walk.id)
+    for page in walk.grid.pages:
+        yield parse(CellTable, store.get(prefix + page.href), page.href)
 
 
 def _triple(values: NDArray[np.float64]) -> Triple:

@@ -1,8 +1,8 @@
 """`python -m farfield_worker cell`: bakes the cells named on its standard input, one at a time.
 
 It prints one JSON line `{"ready": true, "renderer": ...}`, then one for each line `i_j_k` it reads:
-`{"cell": ..., "ok": true, "figures": {...}}` or `{"cell": ..., "ok": false, "error": sentence}`. It
-ends with its input.
+`{"cell": ..., "ok": true, "figures": {...}}` or `{"cell": ..., "ok": false, "error": sentence}`,
+with `"store": true` where the store is to blame. It ends with its input, or with its parent.
 """
 
 from __future__ import annotations
@@ -17,8 +17,13 @@ from farfield_core.bake import read_walk
 from farfield_core.cells import parse_cell_name
 from farfield_core.errors import FarfieldError
 from farfield_core.scenes import open_prepared
-from farfield_core.store import Store
+from farfield_core.store import Store, StoreError
 from farfield_core.tables import walk_grid
+
+from farfield_worker.orphans import end_with_parent
+
+#: seconds that a store may be gone before a cell is handed back
+PATIENCE = 120.0
 
 
 def main(argv: list[str]) -> int:
@@ -27,6 +32,7 @@ def main(argv: list[str]) -> int:
     parser.add_argument("--store", required=True, help="a folder or a store's address")
     parser.add_argument("--bake", required=True, help="the bake's id")
     options = parser.parse_args(argv)
+    end_with_parent()
     # One process per core is faster than one process on all cores, for Mesa and for Numba.
     os.environ.setdefault("LP_NUM_THREADS", "0")
     os.environ.setdefault("NUMBA_NUM_THREADS", "1")
@@ -34,7 +40,7 @@ def main(argv: list[str]) -> int:
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     try:
-        serve(Store.open(options.store), options.bake, sys.stdin, answers)
+        serve(Store.open(options.store, patience=PATIENCE), options.bake, sys.stdin, answers)
     except FarfieldError as error:
         print(str(error), file=sys.stderr)
         return error.exit_code
@@ -60,7 +66,7 @@ def serve(store: Store, bake: str, requests: TextIO, answers: TextIO) -> None:
                 index = parse_cell_name(name)
                 cell = baker.bake(index, grid.centre(index))
             except FarfieldError as error:
-                answer(cell=name, ok=False, error=str(error))
+                answer(cell=name, ok=False, error=str(error), store=isinstance(error, StoreError))
             else:
                 answer(cell=name, ok=True, figures=cell.figures)
     finally:

@@ -6,84 +6,117 @@ after a pool process died is therefore sent as a task of its own, to be run by a
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import os
+import socket
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any
 
 from celery import Celery, Task, signals
-from farfield_core import layout, scenes
-from farfield_core.cells import parse_cell_name
-from farfield_core.control import read_control, write_failure
+from farfield_core import scenes
+from farfield_core.dispatch.board import Board, Slot
+from farfield_core.dispatch.celery_prepare import PREPARING
 from farfield_core.dispatch.executor import COMMAND
-from farfield_core.dispatch.jobs import ATTEMPTS
 from farfield_core.dispatch.prepare import prepare_scene
 from farfield_core.dispatch.queues import (
     BAKE_CELL,
-    CELL_FAILED,
+    CELL_TRIED,
     PREPARE_SCENE,
     RETRIES,
     SMALL,
+    Device,
     celery_app,
+    cell_queues,
+    served_queues,
 )
-from farfield_core.errors import SceneRefusedError
+from farfield_core.errors import FarfieldError, SceneRefusedError
 from farfield_core.store import Store
 
-from farfield_worker.farm.bakers import Baker
+from farfield_worker.farm.bakers import START_TIMEOUT, Baker, Limits
+from farfield_worker.farm.desk import Desk
+from farfield_worker.farm.heartbeat import Heartbeat
+from farfield_worker.orphans import end_with_parent
+
+log = logging.getLogger(__name__)
+
+#: seconds that a store may be gone before a cell is handed back
+_PATIENCE = 60.0
 
 
-def create_worker(broker: str, store_url: str, command: Sequence[str] = COMMAND) -> Celery:
+def create_worker(
+    broker: str,
+    store_url: str,
+    command: Sequence[str] = COMMAND,
+    device: Device = "cpu",
+    limits: Limits | None = None,
+) -> Celery:
     """Make the application that `farfield worker` runs; `command` starts what bakes a cell."""
-    app = celery_app(broker)
+    limits = limits or Limits()
+    app = celery_app(broker, device, START_TIMEOUT + limits.seconds + 60)
+    name = f"{socket.gethostname()}-{os.getpid()}"
+    desks: list[Desk] = []
 
-    # Both are made in a pool process, when it is first asked for a cell.
-    @lru_cache(maxsize=1)
-    def store() -> Store:
-        return Store.open(store_url)
+    def desk() -> Desk:
+        return desks[0]
 
-    @lru_cache(maxsize=1)
-    def baker() -> Baker:
-        return Baker(store_url, command)
+    @signals.worker_process_init.connect(weak=False)
+    def sit_down(**_: Any) -> None:
+        """Make what a pool process works with, in that process."""
+        end_with_parent()
+        board = Board(broker)
+        baker = Baker(store_url, command, limits)
+        slot = Slot(name, os.getpid(), socket.gethostname(), device)
+        heartbeat = Heartbeat(board, slot, baker.drop, lambda: baker.megabytes)
+        store = Store.open(store_url, patience=_PATIENCE)
+        desks[:] = [Desk(store, baker, board, heartbeat)]
 
-    @app.task(name=BAKE_CELL, autoretry_for=(Exception,), **RETRIES)
-    def bake_cell(bake: str, cell: str) -> None:
-        control = read_control(store(), bake)
-        if control is not None and control.wanted in ("paused", "cancelled"):
-            return
-        key = layout.cell_key(bake, parse_cell_name(cell))
-        if store().exists(key):
-            return
-        baker().bake_cell(bake, cell)
-        if not store().exists(key):
-            raise RuntimeError(f"Cell {cell} was not found in the store after it was baked.")
+    @signals.worker_process_shutdown.connect(weak=False)
+    def stand_up(**_: Any) -> None:
+        if desks:
+            desk().baker.close()
+            desk().heartbeat.close()
 
-    @app.task(name=CELL_FAILED, **RETRIES)
-    def cell_failed(bake: str, cell: str, reason: str) -> None:
-        write_failure(store(), bake, cell, reason)
+    @app.task(name=BAKE_CELL, bind=True)
+    def bake_cell(task: Task, bake: str, cell: str, avoid: Sequence[str] = ()) -> None:
+        def hand_over() -> None:
+            queue = task.request.delivery_info.get("routing_key") or cell_queues(device)[1]
+            with contextlib.suppress(Exception):  # the feeder finds a cell that gets lost
+                app.send_task(BAKE_CELL, [bake, cell, list(avoid)], queue=queue, retry=False)
+
+        desk().bake(bake, cell, avoid, hand_over)
+
+    @app.task(name=CELL_TRIED)
+    def cell_tried(bake: str, cell: str, reason: str) -> None:
+        with contextlib.suppress(FarfieldError):
+            desk().tried(bake, cell, reason)
 
     @app.task(name=PREPARE_SCENE, bind=True, **RETRIES)
     def prepare(task: Task, scene: str) -> None:
+        if not desk().heartbeat.begin(PREPARING, scene):
+            return
         try:
-            prepare_scene(store(), scene)
+            prepare_scene(desk().store, scene)
         except SceneRefusedError:
             return  # the store remembers why
         except Exception as error:
             if task.request.retries >= task.max_retries:
-                scenes.refuse(store(), scene, f"The scene could not be prepared: {error}")
+                scenes.refuse(desk().store, scene, f"The scene could not be prepared: {error}")
                 raise
             raise task.retry(exc=error) from None
+        finally:
+            desk().heartbeat.end("")
 
     @signals.task_failure.connect(sender=bake_cell, weak=False)
-    def give_up(args: list[str] | None = None, exception: object = None, **_: Any) -> None:
-        """Called in whichever process saw the last attempt end."""
-        bake, cell = args or ("", "")
-        reason = f"{exception} (tried {ATTEMPTS} times)"
-        app.send_task(CELL_FAILED, [bake, cell, reason], queue=SMALL)
+    def blame(args: Sequence[str] | None = None, exception: object = None, **_: Any) -> None:
+        """Called in the parent when a pool process died with a cell."""
+        bake, cell, *_others = args or ("", "")
+        app.send_task(CELL_TRIED, [bake, cell, str(exception)], queue=SMALL, retry=False)
 
     return app
 
 
-def run_worker(app: Celery, jobs: int | None) -> None:
+def run_worker(app: Celery, jobs: int | None, device: Device = "cpu") -> None:
     """Work until told to stop; cells under way are finished first."""
     # Many small software renderers beat one that uses all cores.
     os.environ.setdefault("LP_NUM_THREADS", "0")
@@ -92,6 +125,8 @@ def run_worker(app: Celery, jobs: int | None) -> None:
             "worker",
             "--pool=prefork",
             f"--concurrency={jobs or os.cpu_count() or 1}",
+            f"--queues={','.join(served_queues(device))}",
+            f"--hostname=farfield-{os.getpid()}@%h",
             "--loglevel=INFO",
             "--without-gossip",
             "--without-mingle",
@@ -100,6 +135,9 @@ def run_worker(app: Celery, jobs: int | None) -> None:
 
 
 def answering_workers(broker: str, hostname: str) -> int:
-    """How many workers on a host answer within some seconds."""
-    app = celery_app(broker)
-    return len(app.control.ping(destination=[f"celery@{hostname}"], timeout=5.0))
+    """How many workers on a host gave a sign of life lately."""
+    board = Board(broker)
+    try:
+        return len({slot.worker for slot in board.slots() if slot.host == hostname})
+    finally:
+        board.close()

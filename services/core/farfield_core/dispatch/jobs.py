@@ -1,17 +1,28 @@
-"""What is left to do of one bake: cells waiting, under way, tried and failed. No processes here."""
+"""What is left to do of one bake: cells waiting, under way, tried and failed. No processes here.
+
+A bake of a million cells has to fit: a cell is a row of a table and its state a byte, and only what
+is under way, tried or failed has an entry of its own.
+"""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
+from itertools import islice
 
-from farfield_core.bake import missing_cells, read_walk
-from farfield_core.cells import cell_name
+import numpy as np
+from numpy.typing import NDArray
+
+from farfield_core.bake import done_names, read_walk
 from farfield_core.dispatch import BakeStatus, State
+from farfield_core.dispatch.rows import CellRows
 from farfield_core.store import Store
+from farfield_core.tables import walk_grid
 
 #: how often a cell is tried before it has failed
 ATTEMPTS = 3
+
+_WAITING, _RUNNING, _DONE, _FAILED = range(4)
 
 
 class Job:
@@ -19,69 +30,122 @@ class Job:
 
     Attributes:
         state: see BakeStatus.
-        reason: why the bake as a whole cannot go on.
+        reason: why the bake as a whole cannot go on, or does not.
         running: cells under way.
         failed: why each failed cell failed.
+        hold: whether the bake does not end before `confirm`.
     """
 
-    def __init__(self, store: Store, bake: str) -> None:
+    def __init__(self, store: Store, bake: str, hold: bool = False) -> None:
         walk = read_walk(store, bake)
-        missing = [cell_name(index) for index in missing_cells(store, walk)]
+        self._rows = CellRows(walk_grid(store, walk).index)
+        self._states = np.full(len(self._rows), _WAITING, np.uint8)
         self.bake = bake
-        self.total = walk.grid.total
-        self.state: State = "queued" if missing else "done"
+        self.total = len(self._rows)
         self.reason: str | None = None
         self.running: set[str] = set()
         self.failed: dict[str, str] = {}
-        self._waiting = deque(missing)
-        self._open = set(missing)  # neither done nor failed
         self._attempts: dict[str, int] = {}
+        # Waiting rows are taken from the front, then in order, then from the back. A row may stand
+        # in several places: its state tells whether it still waits.
+        self._front: deque[int] = deque()
+        self._next = 0
+        self._back: deque[int] = deque()
+        self._open = self.total  # neither done nor failed
+        self.state: State = "queued"
+        self.hold = hold
+        there = self.listed(done_names(store, bake))
+        self._states[there] = _DONE
+        self._open -= int(there.sum())
 
     def first(self, cells: Iterable[str]) -> None:
         """Move waiting cells to the front."""
-        wanted = [cell for cell in dict.fromkeys(cells) if cell in self._open - self.running]
-        chosen = set(wanted)
-        self._waiting = deque([*wanted, *(c for c in self._waiting if c not in chosen)])
+        rows = [row for row in self._known(cells) if self._states[row] == _WAITING]
+        self._front.extendleft(reversed(rows))
 
     def take(self) -> str | None:
         """The next cell to bake, if the bake may go on and one waits."""
-        if self.state not in ("queued", "running") or not self._waiting:
+        if self.state not in ("queued", "running"):
+            return None
+        row = self._take_row()
+        if row is None:
             return None
         self.state = "running"
-        cell = self._waiting.popleft()
+        self._states[row] = _RUNNING
+        cell = self._rows.name(row)
         self.running.add(cell)
         return cell
 
     def done(self, cell: str) -> None:
         """A cell exists."""
         self.running.discard(cell)
-        self._open.discard(cell)
+        self._end(cell, _DONE)
+
+    def found(self, cells: Iterable[str]) -> list[str]:
+        """These cells exist; returns those of which that was not known."""
+        rows = self._rows.find(cells)
+        fresh = np.unique(rows[(rows >= 0) & (self._states[rows] != _DONE)])
+        names = [self._rows.name(row) for row in fresh.tolist()]
+        for name in names:
+            if self.failed.pop(name, None) is not None:
+                self._open += 1
+        self._states[fresh] = _DONE
+        self._open -= len(fresh)
+        self.running.difference_update(names)
         self._settle()
+        return names
+
+    def snapshot(self) -> NDArray[np.bool_]:
+        """Cells known to exist, (total,) bool; for `confirm`."""
+        return np.asarray(self._states == _DONE)
+
+    def listed(self, cells: Iterable[str]) -> NDArray[np.bool_]:
+        """Cells by row, (total,) bool. Safe to call without the lock, as it may take long."""
+        seen, names = np.zeros(self.total, np.bool_), iter(cells)
+        while batch := list(islice(names, 4096)):
+            rows = self._rows.find(batch)
+            seen[rows[rows >= 0]] = True
+        return seen
+
+    def confirm(self, seen: NDArray[np.bool_], before: NDArray[np.bool_]) -> list[str]:
+        """The store lists the cells `seen`; returns those of which that was not known.
+
+        `before` is the snapshot from when listing began: what it holds and the list does not is
+        gone and waits again.
+        """
+        gone = np.flatnonzero(before & ~seen & (self._states == _DONE))
+        self._states[gone] = _WAITING
+        self._front.extend(gone.tolist())
+        self._open += len(gone)
+        fresh = np.flatnonzero(seen & (self._states != _DONE))
+        hold, self.hold = self.hold, False
+        names = self.found([self._rows.name(row) for row in fresh.tolist()])
+        self.hold = hold
+        return names
 
     def put_back(self, cell: str) -> None:
         """A cell was not finished, through no fault of its own."""
-        self.running.discard(cell)
-        self._waiting.appendleft(cell)
+        self._wait(cell, first=True)
+
+    def again(self, cell: str) -> None:
+        """Somebody else, who counts attempts, has a cell tried again, after all that wait."""
+        self._wait(cell, first=False)
 
     def stumbled(self, cell: str, reason: str) -> bool:
         """A cell went wrong; returns whether it will be tried again."""
-        self.running.discard(cell)
         self._attempts[cell] = self._attempts.get(cell, 0) + 1
         again = self._attempts[cell] < ATTEMPTS
         if again:
-            self._waiting.append(cell)
+            self._wait(cell, first=False)
         else:
-            self.failed[cell] = f"{reason} (tried {self._attempts[cell]} times)"
-            self._open.discard(cell)
-        self._settle()
+            self.fail(cell, f"{reason} (tried {self._attempts[cell]} times)")
         return again
 
     def fail(self, cell: str, reason: str) -> None:
-        """Somebody else, who counts attempts, has given a cell up."""
+        """A cell is given up."""
         self.running.discard(cell)
-        self._open.discard(cell)
         self.failed[cell] = reason
-        self._settle()
+        self._end(cell, _FAILED)
 
     def give_up(self, reason: str) -> None:
         """The bake as a whole cannot go on."""
@@ -91,25 +155,63 @@ class Job:
         """Failed cells wait again."""
         for cell in self.failed:
             self._attempts.pop(cell, None)
-            self._open.add(cell)
-            self._waiting.append(cell)
+            self._wait(cell, first=False)
+        self._open += len(self.failed)
         self.failed = {}
         self.reason = None
         if self._open and self.state == "failed":
             self.state = "queued"
+
+    @property
+    def left(self) -> int:
+        """Cells neither done nor failed."""
+        return self._open
 
     def status(self) -> BakeStatus:
         """Where the bake stands."""
         return BakeStatus(
             state=self.state,
             total=self.total,
-            done=self.total - len(self._open) - len(self.failed),
+            done=self.total - self._open - len(self.failed),
             failed=len(self.failed),
             running=len(self.running),
             reasons=dict(self.failed),
             reason=self.reason,
         )
 
+    def _known(self, cells: Iterable[str]) -> list[int]:
+        return [row for row in self._rows.find(dict.fromkeys(cells)).tolist() if row >= 0]
+
+    def _wait(self, cell: str, *, first: bool) -> None:
+        self.running.discard(cell)
+        for row in self._known([cell]):
+            if self._states[row] in (_RUNNING, _FAILED):
+                self._states[row] = _WAITING
+                if first:
+                    self._front.appendleft(row)
+                else:
+                    self._back.append(row)
+
+    def _take_row(self) -> int | None:
+        while self._front:
+            if self._states[row := self._front.popleft()] == _WAITING:
+                return row
+        while self._next < self.total:
+            self._next += 1
+            if self._states[self._next - 1] == _WAITING:
+                return self._next - 1
+        while self._back:
+            if self._states[row := self._back.popleft()] == _WAITING:
+                return row
+        return None
+
+    def _end(self, cell: str, state: int) -> None:
+        for row in self._known([cell]):
+            if self._states[row] in (_WAITING, _RUNNING):
+                self._open -= 1
+            self._states[row] = state
+        self._settle()
+
     def _settle(self) -> None:
-        if not self._open and self.state != "cancelled":
+        if not self._open and not self.hold and self.state != "cancelled":
             self.state = "failed" if self.failed else "done"

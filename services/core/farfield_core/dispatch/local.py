@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import os
 import threading
+from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal
 
@@ -62,6 +63,7 @@ class LocalDispatcher:
         self._bad_starts: dict[str, int] = {}
         self._closed = False
         self._changed = threading.Condition()
+        self._events: deque[Event] = deque()
         self._telling = threading.Lock()
         count = jobs if jobs is not None else (os.cpu_count() or 1)
         if count < 1:
@@ -84,8 +86,9 @@ class LocalDispatcher:
         with self._changed:
             self._jobs[bake] = job
             self._bad_starts.pop(bake, None)
+            self._note(job, "state")
             self._changed.notify_all()
-        self._tell(bake, "state")
+        self._tell()
 
     def first(self, bake: str, cells: Iterable[str]) -> None:
         """Bake these cells before all others; the first named comes first."""
@@ -103,8 +106,9 @@ class LocalDispatcher:
             job = self._job(bake)
             if job.state not in ENDED:
                 job.state = "paused"
+            self._note(job, "state")
             self._changed.notify_all()
-        self._tell(bake, "state")
+        self._tell()
 
     def resume(self, bake: str) -> None:
         """Go on with a paused bake."""
@@ -112,8 +116,9 @@ class LocalDispatcher:
             job = self._job(bake)
             if job.state == "paused":
                 job.state = "queued"
+            self._note(job, "state")
             self._changed.notify_all()
-        self._tell(bake, "state")
+        self._tell()
 
     def cancel(self, bake: str) -> None:
         """Stop at once; what is done stays, and `submit` takes the bake up again."""
@@ -124,16 +129,19 @@ class LocalDispatcher:
             for executor in self._executors.values():
                 if executor.bake == bake:
                     executor.kill()
+            self._note(job, "state")
             self._changed.notify_all()
-        self._tell(bake, "state")
+        self._tell()
 
     def retry(self, bake: str) -> None:
         """Try failed cells anew."""
         with self._changed:
-            self._job(bake).retry()
+            job = self._job(bake)
+            job.retry()
             self._bad_starts.pop(bake, None)
+            self._note(job, "state")
             self._changed.notify_all()
-        self._tell(bake, "state")
+        self._tell()
 
     def status(self, bake: str) -> BakeStatus:
         """Where a bake stands; raises NotFoundError for one never submitted."""
@@ -169,22 +177,29 @@ class LocalDispatcher:
         except KeyError:
             raise _unknown(bake) from None
 
-    def _tell(
+    def _note(
         self,
-        bake: str,
+        job: Job,
         kind: Literal["state", "started", "done", "retried", "failed"],
         cell: str | None = None,
         figures: Mapping[str, float] | None = None,
         reason: str | None = None,
     ) -> None:
-        if self._listener is None:
-            return
+        """Remember an event. The caller holds the lock, so events stand in their true order."""
+        if self._listener is not None:
+            event = Event(job.bake, kind, job.state, cell, dict(figures or {}), reason)
+            self._events.append(event)
+
+    def _tell(self) -> None:
+        """Tell of what was noted, one at a time and in order; the caller holds no lock."""
         with self._telling:
-            state = self.status(bake).state
-            try:
-                self._listener(Event(bake, kind, state, cell, dict(figures or {}), reason))
-            except Exception:  # a listener's fault must not end the baking
-                log.exception("A listener failed on %s of bake %s.", kind, bake)
+            while self._events:
+                event = self._events.popleft()
+                assert self._listener
+                try:
+                    self._listener(event)
+                except Exception:  # a listener's fault must not end the baking
+                    log.exception("A listener failed on %s of bake %s.", event.kind, event.bake)
 
     def _serve(self, slot: int) -> None:
         """One slot: take a cell, bake it in this slot's process, tell what became of it."""
@@ -213,7 +228,9 @@ class LocalDispatcher:
         except ExecutorError as error:
             self._bad_start(slot, job, cell, str(error))
             return
-        self._tell(job.bake, "started", cell)
+        with self._changed:
+            self._note(job, "started", cell)
+        self._tell()
         figures: dict[str, float] = {}
         reason = f"Cell {cell} was not found in the store after it was baked."
         try:
@@ -238,15 +255,16 @@ class LocalDispatcher:
                 job.put_back(cell)
             else:
                 again = job.stumbled(cell, reason)
-            ended = job.state != before and job.state in ENDED
+            if exists:
+                self._note(job, "done", cell, figures)
+            elif not stopped:
+                self._note(job, "retried" if again else "failed", cell, reason=reason)
+            if job.state != before and job.state in ENDED:
+                self._note(job, "state")
             self._changed.notify_all()
-        if exists:
-            self._tell(job.bake, "done", cell, figures)
-        elif not stopped:
+        if not exists and not stopped:
             self._drop(slot)  # the next attempt gets a fresh process
-            self._tell(job.bake, "retried" if again else "failed", cell, reason=reason)
-        if ended:
-            self._tell(job.bake, "state")
+        self._tell()
 
     def _executor(self, slot: int, job: Job) -> Executor:
         """This slot's process for the job's bake, started if need be; raises ExecutorError."""
@@ -279,9 +297,9 @@ class LocalDispatcher:
             given_up = self._bad_starts[job.bake] >= STARTS and job.state not in ENDED
             if given_up:
                 job.give_up(f"Baking could not begin. {reason}")
+                self._note(job, "state", reason=reason)
             self._changed.notify_all()
-        if given_up:
-            self._tell(job.bake, "state", reason=reason)
+        self._tell()
 
     def _drop(self, slot: int) -> None:
         with self._changed:

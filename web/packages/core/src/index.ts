@@ -18,4 +18,5 @@ export * from './objects/index.js';
 export * from './prefetch.js';
 export * from './quads.js';
 export * from './shared-store.js';
+export * from './solid.js';
 export * from './upload-scheduler.js';

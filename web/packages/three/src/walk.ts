@@ -12,6 +12,7 @@ import {
   type CellBuilder,
   type CellTable,
   type Manifest,
+  type Solid,
   type Vec3,
 } from '@farfield/core';
 import {
@@ -67,6 +68,8 @@ export interface WalkEvents {
 }
 
 const MEGABYTE = 2 ** 20;
+/** Cells ahead of a walker that prefetching counts on. */
+const LEAD = 1.5;
 
 export class Walk extends EventDispatcher<WalkEvents> {
   /** Add this to your scene. It may be moved and turned. */
@@ -78,6 +81,8 @@ export class Walk extends EventDispatcher<WalkEvents> {
   index: CellIndex | undefined;
   /** Keep the shown cell while the camera moves on. */
   frozen = false;
+  /** Draw cells; the sky is drawn without them too. */
+  visible = true;
   /** Object impostors: what was placed with `add`, and objects of the near field. */
   readonly objects: WalkObjects;
   private readonly options: WalkOptions;
@@ -88,7 +93,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
   private readonly alpha: IUniform<number>;
   private stage: Stage | undefined;
   private camera: Camera | undefined;
-  private view: CellView | undefined;
+  private shownView: CellView | undefined;
   private shown: Cell | undefined;
   private ensuredAt: Vec3 | undefined;
   private loadSeconds = 0;
@@ -133,16 +138,16 @@ export class Walk extends EventDispatcher<WalkEvents> {
     if (!this.frozen) {
       const view = stage.streamer.update(motion);
       const { shown } = stage.streamer;
-      if (view !== undefined && view !== this.view) {
-        if (this.view !== undefined) this.view.group.visible = false;
-        view.group.visible = true;
-        this.view = view;
+      if (view !== undefined && view !== this.shownView) {
+        if (this.shownView !== undefined) this.shownView.group.visible = false;
+        this.shownView = view;
         if (shown !== undefined && shown.name !== this.shown?.name) {
           this.shown = shown;
           this.dispatchEvent({ type: 'cell-change', cell: shown });
         }
       }
     }
+    this.showCells();
     stage.uploads.frame(this.options.uploadBytes ?? MEGABYTE);
     stage.attributes.update();
     this.objects.update(this.view, this.manifest?.walk.near_field ?? Infinity, camera, now);
@@ -161,6 +166,11 @@ export class Walk extends EventDispatcher<WalkEvents> {
     this.objects.remove(object);
   }
 
+  /** Make a change of `visible` count before the next `update`. */
+  showCells(): void {
+    if (this.shownView !== undefined) this.shownView.group.visible = this.visible;
+  }
+
   /** Whether the camera's own cell is complete and shown. */
   get settled(): boolean {
     return this.stage?.streamer.settled ?? false;
@@ -174,6 +184,23 @@ export class Walk extends EventDispatcher<WalkEvents> {
   /** The cell that is shown. */
   get cell(): Cell | undefined {
     return this.shown;
+  }
+
+  /** The shown cell's meshes. */
+  get view(): CellView | undefined {
+    return this.shownView;
+  }
+
+  /** What a walker in the shown cell stands on and bumps into. */
+  get solid(): Solid | undefined {
+    return this.shownView?.solid;
+  }
+
+  /** Metres a second at which cells still arrive in time, from how long they took to load lately. */
+  get topSpeed(): number {
+    const { index, loadSeconds } = this;
+    if (index === undefined || loadSeconds === 0) return Infinity;
+    return (LEAD * index.cellSize) / loadSeconds;
   }
 
   /** The cell that should be shown, and what has become of it. */
@@ -194,7 +221,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
   get stats(): WalkStats {
     return readStats({
       stage: this.stage,
-      view: this.view,
+      view: this.shownView,
       cell: this.shown,
       queue: this.queue,
       loadSeconds: this.loadSeconds,
@@ -291,7 +318,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
     // Everything on the graphics card is gone, and can only be let go of before a new context comes.
     this.stage?.dispose();
     this.stage = undefined;
-    this.view = undefined;
+    this.shownView = undefined;
     this.shown = undefined;
     this.dispatchEvent({ type: 'context-lost' });
   };
