@@ -15,6 +15,7 @@ from farfield_worker.compile.atlas import lay_out
 from farfield_worker.compile.layered import CompiledFace, Rules, compile_face, gutter_free
 from farfield_worker.compile.pack import GUTTER
 from farfield_worker.compile.quads import layer_quads
+from farfield_worker.cell.sight import Sight
 from farfield_worker.render import Renderer, open_renderer
 
 
@@ -43,17 +44,26 @@ class LayeredImpostors:
             settings.gap_texels,
         ).near_field
         self._borders = (*walk.borders, inner)
+        self._sight = Sight(scene, walk, settings) if settings.visibility == "on" else None
 
     def make(self, centre: NDArray[np.float64], watch: Stopwatch) -> Impostors:
         """Impostors of the cell around `centre` (3,), scene coordinates."""
         resolution, layers = self.walk.resolution, self.walk.layers
-        compiled = {}
+        drawn, compiled = {}, {}
         for face in self._faces:
             with watch("render"):
                 texels = self._renderer.face(centre, face, self._borders, resolution)
-            with watch("compile"):
                 if (texels.layer < len(layers)).any():
-                    compiled[face] = compile_face(texels, self._rules, self._face_half(face))
+                    drawn[face] = texels
+        seen = None
+        if self._sight is not None:
+            with watch("visibility"):
+                seen = self._sight.seen(centre, drawn)
+        for face, texels in drawn.items():
+            with watch("compile"):
+                half = self._face_half(face)
+                mask = None if seen is None else seen[face]
+                compiled[face] = compile_face(texels, self._rules, half, mask)
         with watch("compile"):
             size = (self.walk.atlas.width, self.walk.atlas.height)
             boxes, places, pages = lay_out(compiled, resolution, size)
@@ -63,6 +73,8 @@ class LayeredImpostors:
     def close(self) -> None:
         """Free what the renderer holds."""
         self._renderer.close()
+        if self._sight is not None:
+            self._sight.close()
 
     def _face_half(self, face: int) -> tuple[float, float, float]:
         """Half extents of the cell along a face's right, down and forward."""

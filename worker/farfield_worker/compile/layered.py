@@ -58,12 +58,16 @@ class CompiledFace(NamedTuple):
 
 
 def compile_face(
-    texels: FaceTexels, rules: Rules, half: tuple[float, float, float]
+    texels: FaceTexels,
+    rules: Rules,
+    half: tuple[float, float, float],
+    seen: NDArray[np.bool_] | None = None,
 ) -> CompiledFace:
     """Compile a face of a cell with `half` extents in the face's axes (right, down, forward).
 
     `texels` have one layer more, just inside the near field: it is filled under like any other, so
-    that no gap opens at the near border, and not stored.
+    that no gap opens at the near border, and not stored. `seen` (n,) says which of them some eye of
+    the cell can see, all unless given; what fills a gap is seen with the texel it continues.
     """
     count, resolution = len(rules.layers), rules.resolution
     shifts = reaches(rules.layers, half, resolution)
@@ -78,6 +82,9 @@ def compile_face(
         unseen = hidden(covered, shifts)
     texel, layer = bitplanes.listed(covered & ~unseen)
     source = sources(starts, texels.layer, texel, layer)
+    if seen is not None:
+        shown = seen[source]
+        texel, layer, source = texel[shown], layer[shown], source[shown]
     owner = np.empty(len(texel), np.int32)
     boxes = np.empty((len(texel), 5), np.int32)
     boxes_made = GROWERS[rules.grower](
