@@ -18,7 +18,13 @@ from PIL import Image
 
 from tests.unit.scenes import SceneWriter
 
-SETTINGS: dict[str, Any] = {"cell_size": 2, "layers": 12, "resolution": 40, "faces": "all"}
+SETTINGS: dict[str, Any] = {
+    "quads": "layers",
+    "cell_size": 2,
+    "layers": 12,
+    "resolution": 40,
+    "faces": "all",
+}
 
 
 def town(writer: SceneWriter) -> None:

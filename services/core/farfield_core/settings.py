@@ -18,15 +18,20 @@ class BakeSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    quads: Literal["layers", "slanted"] = Field(
-        default="layers",
-        description="kind of impostor quads: the paper's layers, or planes of any slant",
+    quads: Literal["slanted", "layers"] = Field(
+        default="slanted",
+        description="kind of impostor quads: planes of any slant, or the paper's layers",
     )
     cell_size: tuple[Positive, Positive, Positive] = Field(
         default=(10.0, 10.0, 10.0),
         description="edge lengths of a view cell, metres; one number means a cube",
     )
-    layers: int = Field(default=64, ge=1, le=4096, description="number of layers")
+    layers: int = Field(
+        default=64,
+        ge=1,
+        le=4096,
+        description="number of layers; slanted quads get the near field that so many layers have",
+    )
     near: Positive | None = Field(
         default=None,
         description="half width of the near field, metres; with layers it chooses their number, "
@@ -80,6 +85,20 @@ class BakeSettings(BaseModel):
                 f"near {self.near:g} lies inside the cell; "
                 f"use more than {max(self.cell_size) / 2:g}"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _only_for_layers(self) -> BakeSettings:
+        if self.quads == "slanted":
+            for name, value, default in (
+                ("grower", self.grower, "best"),
+                ("supersample", self.supersample, 1),
+                ("renderer", self.renderer, "moderngl"),
+            ):
+                if value != default:
+                    raise ValueError(
+                        f"{name} {value} is for layers; choose layers for quads, or leave it out"
+                    )
         return self
 
     @property

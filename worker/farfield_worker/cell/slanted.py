@@ -29,7 +29,7 @@ class SlantedImpostors:
     def __init__(self, scene: PreparedScene, walk: Walk, settings: BakeSettings) -> None:
         self.walk = walk
         self._baker = SlantedBaker(
-            scene, walk.resolution, max(8, _CACHE // (12 * walk.resolution**2))
+            scene, walk.resolution, max(8, _CACHE // (8 * walk.resolution**2))
         )
         with gl.current() as context:
             self.name = gl.device_name(context)

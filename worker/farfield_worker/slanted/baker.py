@@ -87,8 +87,8 @@ class SlantedBaker:
         self.resolution = resolution
         clusters = Clusters(scene)
         self._abuffer = ABuffer(scene, clusters)
-        self._renderer = DepthMapRenderer(scene, resolution, clusters)
-        self.maps = MapCache(self._renderer, cache)
+        self.renderer = DepthMapRenderer(scene, resolution, clusters)
+        self.maps = MapCache(self.renderer, cache)
         self._painter = QuadPainter(resolution)
 
     def cell(
@@ -125,7 +125,7 @@ class SlantedBaker:
 
     def close(self) -> None:
         """Free what the GPU holds."""
-        for thing in (self._abuffer, self._renderer, self._painter):
+        for thing in (self._abuffer, self.renderer, self._painter):
             thing.close()
 
     def _tolerance(self, face: int, settings: SlantedSettings) -> Tolerance:
@@ -168,6 +168,7 @@ class SlantedBaker:
         half = np.asarray(settings.half_extents, np.float64)
         return residual_quads(
             self.scene,
+            self.renderer,
             self.maps,
             self._painter,
             centre,
