@@ -52,7 +52,7 @@ def checked(walk, store, index=INDEX):
     ids=str,
 )
 def test_from_its_centre_a_cell_shows_what_was_rendered(tmp_path, settings):
-    walk, store = small_bake(tmp_path, **settings)
+    walk, store = small_bake(tmp_path, visibility="off", **settings)
     written = bake(walk, store)
     cell = checked(walk, store)
     assert cell == written

@@ -11,11 +11,11 @@ from farfield_core.walk import Walk
 from numpy.typing import NDArray
 
 from farfield_worker.cell.impostors import Impostors, Stopwatch, triple
+from farfield_worker.cell.sight import Sight
 from farfield_worker.compile.atlas import lay_out
 from farfield_worker.compile.layered import CompiledFace, Rules, compile_face, gutter_free
 from farfield_worker.compile.pack import GUTTER
 from farfield_worker.compile.quads import layer_quads
-from farfield_worker.cell.sight import Sight
 from farfield_worker.render import Renderer, open_renderer
 
 
