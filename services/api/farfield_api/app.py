@@ -24,7 +24,18 @@ from farfield_api.idempotency import Idempotency
 from farfield_api.keys import Keys
 from farfield_api.limits import BodyLimit
 from farfield_api.observe import Metrics, Observe, Tracing, cell_listener
-from farfield_api.routers import bakes, events, health, keys, plans, scenes, tus, uploads, walks
+from farfield_api.routers import (
+    bakes,
+    events,
+    farm,
+    health,
+    keys,
+    plans,
+    scenes,
+    tus,
+    uploads,
+    walks,
+)
 from farfield_api.routers.tus import TusHeaders
 from farfield_api.service import FarfieldService
 from farfield_api.settings import ApiSettings
@@ -133,7 +144,7 @@ def create_app(
         )
     app.add_middleware(Observe, metrics=metrics, tracing=tracing)
     exceptions.install(app)
-    for module in (health, scenes, uploads, tus, plans, bakes, events, walks, keys):
+    for module in (health, scenes, uploads, tus, plans, bakes, events, walks, farm, keys):
         app.include_router(module.router, prefix=PREFIX)
     app.include_router(health.metrics_router)
     pages.install(app, settings.web)

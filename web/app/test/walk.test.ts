@@ -236,6 +236,15 @@ describe('Walker on solid ground', () => {
     expect(walker.eye[1]).toBeCloseTo(high, 1);
   });
 
+  test('ground that comes to be known later pulls nobody down', () => {
+    const walker = at([5, 4, 5]);
+    for (let n = 0; n < 10; n++) walker.step(1 / 30, STILL, { index, brake: () => 1 });
+    walk(walker, solidOf(floor), 2, {});
+    expect(walker.eye[1]).toBeCloseTo(4, 6);
+    for (let n = 0; n < 10; n++) walker.step(1 / 30, STILL, { index, brake: () => 1 });
+    expect(walker.eye[1]).toBeCloseTo(4, 6);
+  });
+
   test('climbs steps, and is stopped by what is higher than a step', () => {
     const step: [Vec3, Vec3] = [
       [-20, 1, -20],
