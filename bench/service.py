@@ -60,9 +60,9 @@ def fill(store: Store) -> None:
     """A bake whose cells have as many numbers as real ones."""
     random = np.random.default_rng(1)
     store.put(layout.walk_key(BAKE), b"{}")
-    numbers = np.round(random.normal(size=260_000), 4).tolist()
+    numbers = json.dumps(np.round(random.normal(size=260_000), 4).tolist(), separators=(",", ":"))
     for i in range(CELLS):
-        data = json.dumps({"cell": [i, 0, 0], "corners": numbers}, separators=(",", ":"))
+        data = f'{{"cell":[{i},0,0],"corners":{numbers}}}'
         store.put(layout.cell_key(BAKE, (i, 0, 0)), data.encode())
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import contextlib
 import gzip
+import os
 import re
 import threading
 from collections import OrderedDict
@@ -70,6 +71,8 @@ class PackedObjects:
         self._lock = threading.Lock()
         self._recent: OrderedDict[tuple[str, Coding], bytes] = OrderedDict()
         self._size = 0
+        # each takes several times the memory of what it compresses
+        self._packing = threading.BoundedSemaphore(os.cpu_count() or 1)
         self._making: dict[str, threading.Lock] = {}
 
     def recent(self, key: str, coding: Coding) -> bytes | None:
@@ -102,7 +105,8 @@ class PackedObjects:
             with making:  # many who ask at once wait for one
                 data = self.recent(key, coding)
                 if data is None:
-                    data = pack(self._store.get(key), coding)
+                    with self._packing:
+                        data = pack(self._store.get(key), coding)
                     self._keep((key, coding), data)
                     # a store that is only read is served all the same
                     with contextlib.suppress(FarfieldError):

@@ -12,6 +12,7 @@ from farfield_core.settings import BakeSettings
 from pydantic import BaseModel, ConfigDict, Field
 
 from farfield_api.keys import KeyScope
+from farfield_api.names import IS_ID
 
 SCENE = "3f1c9a52d07be846"
 CORRIDOR = "9b0f6c1de2a34875"
@@ -152,7 +153,7 @@ class BakeRequest(BaseModel):
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [ASKED]})
 
-    scene: str = Field(pattern=r"^[a-z0-9-]{1,64}$")
+    scene: str = Field(pattern=IS_ID.pattern)
     #: a corridor file's content, or the id of one sent before
     corridor: Corridor | Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
     settings: BakeSettings = BakeSettings()
