@@ -1,4 +1,11 @@
-import { findObjects, InlineBuilder, type NearBatch, type NearState } from '@farfield/core';
+import {
+  InlineBuilder,
+  Solid,
+  buildSolid,
+  findObjects,
+  type NearBatch,
+  type NearState,
+} from '@farfield/core';
 import {
   BoxGeometry,
   BufferAttribute,
@@ -59,14 +66,9 @@ function viewOf(batches: NearBatch[]): CellView {
   };
   const cell = { centre: [5, 0, 0] as const, far, atlases: [], near: [] };
   const material = new RawShaderMaterial();
-  return new CellView(
-    cell,
-    [],
-    material,
-    batches,
-    batches.map(() => material),
-    () => undefined,
-  );
+  const materials = batches.map(() => material);
+  const solid = new Solid(buildSolid([], [1, 2, 3], [8, 8, 8]));
+  return new CellView(cell, [], material, batches, materials, solid, () => undefined);
 }
 
 describe('NearObjects', () => {
