@@ -62,8 +62,9 @@ class BakeSettings(BaseModel):
     grower: Literal["greedy", "best"] = Field(
         default="best", description="how texels are gathered into quads"
     )
-    visibility: Literal["on", "off"] = Field(
-        default="on", description="leave out what no eye in the cell can see"
+    visibility: Literal["auto", "on", "off"] = Field(
+        default="auto",
+        description="leave out what no eye in the cell can see; auto: with slanted quads",
     )
     encoder: Literal["png", "webp"] = Field(default="png", description="format of atlas pages")
     supersample: int = Field(

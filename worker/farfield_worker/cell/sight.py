@@ -2,8 +2,7 @@
 
 The paper leaves out what nearer layers hide. In a street it is the near field that hides most, so
 maps of the whole scene are asked, drawn from the cell's centre and corners. Maps of half a face's
-texels do: a point counts as seen if it can be in any of the nine texels around, which takes in what
-lies next to what is seen.
+texels do, for what is seen is spread along its surface.
 """
 
 from __future__ import annotations
@@ -21,11 +20,14 @@ from farfield_worker.slanted.quads import texel_points
 from farfield_worker.slanted.tolerance import Tolerance
 from farfield_worker.visibility.depth_maps import DepthMapRenderer, MapCache
 from farfield_worker.visibility.from_region import cell_eyes, seen
+from farfield_worker.visibility.spread import spread
 
 #: texels of a face, along an edge, to one of a map
 COARSE = 2
 #: the cell's centre and corners
 EYES = slice(0, 9)
+#: texels by which what is seen is taken further along its surface
+SPREAD = 2
 #: maps kept: those of a cell and its neighbour
 _CACHE = 108
 
@@ -46,16 +48,25 @@ class Sight:
         """Which texels of each face of the cell around `centre` (3,) are seen: (n,) bool."""
         if not faces:
             return {}
+        bounds = {
+            face: Tolerance.of(face, np.zeros(3), self._half, self._alpha, self._near, 1.0)
+            for face in faces
+        }
+        disparities = {face: 1 / t.depth.astype(np.float64) for face, t in faces.items()}
         points, slack = [], []
         for face, texels in faces.items():
-            disparity = 1 / texels.depth.astype(np.float64)
-            tolerance = Tolerance.of(face, np.zeros(3), self._half, self._alpha, self._near, 1.0)
-            points.append(centre + texel_points(face, texels.texel, disparity, self._resolution))
-            slack.append(tolerance.interval(disparity)[1] - disparity)
+            d = disparities[face]
+            points.append(centre + texel_points(face, texels.texel, d, self._resolution))
+            slack.append(bounds[face].interval(d)[1] - d)
         eyes = cell_eyes(centre, self._half)[EYES]
         known = seen(np.concatenate(points), np.concatenate(slack), eyes, self._maps)
         ends = np.cumsum([len(texels.texel) for texels in faces.values()])
-        return dict(zip(faces, np.split(known, ends[:-1]), strict=True))
+        return {
+            face: spread(
+                faces[face].texel, disparities[face], mask, bounds[face], self._resolution, SPREAD
+            )
+            for face, mask in zip(faces, np.split(known, ends[:-1]), strict=True)
+        }
 
     def close(self) -> None:
         """Free what the GPU holds."""

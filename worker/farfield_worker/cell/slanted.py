@@ -43,7 +43,7 @@ class SlantedImpostors:
             resolution=walk.resolution,
             tolerance=settings.tolerance,
             faces=face_axes.SIDES if settings.faces == "sides" else face_axes.ALL,
-            visibility=settings.visibility == "on",
+            visibility=settings.visibility != "off",
             segment=SegmentSettings(largest=largest),
         )
 
