@@ -68,7 +68,7 @@ COSTS: dict[str, dict[str, _Cost]] = {
         "quads": _Cost(value=20.1e3, layers=1.2, texels=0.8, triangles=0.0),
     },
     "slanted": {
-        "seconds": _Cost(value=7.0, layers=0.1, texels=0.8, triangles=0.3),
+        "seconds": _Cost(value=3.9, layers=0.1, texels=0.8, triangles=0.3),
         "bytes": _Cost(value=0.93e6, layers=0.44, texels=0.85, triangles=0.0),
         "quads": _Cost(value=3.3e3, layers=0.5, texels=0.77, triangles=0.0),
     },
