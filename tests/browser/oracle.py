@@ -147,7 +147,7 @@ def draw_triangle(
         return
     local = hit + picture.eye - np.array(cell["eyes"][0])
     inside = (inverse > 0) & (weights >= 0).all(axis=-1)
-    inside &= np.abs(local).max(axis=-1) <= walk["near_field"]
+    inside &= np.abs(local).max(axis=-1) <= walk["near_field"] * 17 / 16
     base = np.nan_to_num(weights @ values["COLOR_0"][triangle])
     texture = material.get("pbrMetallicRoughness", {}).get("baseColorTexture")
     if texture is not None:

@@ -35,7 +35,7 @@ def test_a_bake_is_done_when_every_cell_exists(store: Path) -> None:
         assert body["cells"] == {"total": 4, "done": 4, "failed": 0}
         assert body["failures"] == []
         assert body["seconds_left"] is None
-        assert client.get("bakes").json() == {"bakes": [body]}
+        assert client.get("bakes").json() == {"bakes": [body], "next": None}
     assert len(done_cells(Store.open(store), bake)) == 4
 
 

@@ -1,8 +1,10 @@
 """Uploads, preparation, corridors and plans over HTTP."""
 
+import io
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from farfield_core.dispatch.prepare import ScenePreparer
 from farfield_core.scenes import import_source
@@ -42,7 +44,31 @@ def test_a_scene_is_prepared(client: TestClient) -> None:
     assert body["triangles"] == 2
     assert body["bounds"] == {"min": [-100.0, 0.0, -100.0], "max": [100.0, 0.0, 100.0]}
     assert body["notes"] == ["One line primitive was left out."]
-    assert client.get("scenes").json() == {"scenes": [body]}
+    assert client.get("scenes").json() == {"scenes": [body], "next": None}
+
+
+def test_the_prepared_scene_can_be_read_and_nothing_beside_it(client: TestClient) -> None:
+    scene = upload(client, b"slow again")
+    assert "still being prepared" in problem(client.get(f"scenes/{scene}/prepared/scene.json"), 409)
+    until(lambda: client.get(f"scenes/{scene}").json()["state"] == "ready")
+    answer = client.get(f"scenes/{scene}/prepared/scene.json")
+    assert answer.json()["triangles"] == 2
+    assert "immutable" in answer.headers["cache-control"]
+    again = client.get(
+        f"scenes/{scene}/prepared/scene.json", headers={"If-None-Match": answer.headers["etag"]}
+    )
+    assert (again.status_code, again.content) == (304, b"")
+    positions = client.get(f"scenes/{scene}/prepared/positions.npy")
+    assert np.load(io.BytesIO(positions.content)).shape == (4, 3)
+    assert positions.headers["etag"] != answer.headers["etag"]
+    assert client.get(f"scenes/{scene}/prepared/map.png").status_code == 404
+    for name in (
+        "%2e%2e/source/scene",
+        "other.json",
+        "textures/%2e%2e/scene.json",
+        "positions.npy/x",
+    ):
+        assert client.get(f"scenes/{scene}/prepared/{name}").status_code in (404, 422), name
 
 
 def test_the_same_bytes_are_the_same_scene(client: TestClient) -> None:
@@ -135,7 +161,7 @@ def test_planning_needs_a_prepared_scene(client: TestClient) -> None:
     ("change", "word"),
     [
         ({"scene": "nosuchscene"}, "no scene"),
-        ({"corridor": "nosuchcorridor"}, "nosuchcorridor"),
+        ({"corridor": "0123456789abcdef"}, "no corridor"),
         ({"corridor": "../../../etc/passwd"}, "corridor"),
         ({"corridor": {}}, "exactly one"),
         ({"settings": {"layers": 0}}, "layers"),

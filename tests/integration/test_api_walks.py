@@ -79,7 +79,7 @@ def test_a_cell(client: TestClient, walk: Walk) -> None:
     answer = client.get(f"walks/{walk.id}/cells/0_0_0.json")
     assert answer.content == CELL
     assert answer.headers["content-type"] == "application/json"
-    assert answer.headers["content-encoding"] == "gzip"
+    assert answer.headers["content-encoding"] == "br"
     assert answer.headers["cache-control"] == FOREVER
     assert "accept-encoding" in answer.headers["vary"].lower()
 

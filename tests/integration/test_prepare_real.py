@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from farfield_core.scene import PreparedScene, open_scene
-from farfield_worker.near import NearBlocks, near_list
+from farfield_worker.near import NearBlocks, near_list, near_triangles
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -128,7 +128,7 @@ def test_near_blocks(real):
     near = NearBlocks(scene, files.__setitem__)
     middle = scene.info.blocks[len(scene.info.blocks) // 2]
     eye = scene.origin + np.array(middle.high)
-    entries = near_list(scene, eye, 40.0)
+    entries = near_list(scene, near_triangles(scene, eye, 40.0))
     assert entries
     for entry in entries[:3]:
         data = files["blobs/near/" + near.blob(entry.block)]

@@ -18,7 +18,13 @@ from PIL import Image
 
 from tests.unit.scenes import SceneWriter
 
-SETTINGS: dict[str, Any] = {"cell_size": 2, "layers": 12, "resolution": 40, "faces": "all"}
+SETTINGS: dict[str, Any] = {
+    "quads": "layers",
+    "cell_size": 2,
+    "layers": 12,
+    "resolution": 40,
+    "faces": "all",
+}
 
 
 def town(writer: SceneWriter) -> None:
@@ -72,7 +78,11 @@ def front_texels(cell: CellFile, pages: list[NDArray[np.uint8]], face: int, reso
         corners = np.array(quads.corners[8 * q : 8 * q + 8]).reshape(4, 2)
         (x0, y0), (x1, y1) = corners.min(axis=0).astype(int), corners.max(axis=0).astype(int)
         dx, dy = (int(offset) for offset in quads.offsets[2 * q : 2 * q + 2])
-        tile = pages[quads.pages[q]][y0 + dy : y1 + dy, x0 + dx : x1 + dx]
+        page = pages[quads.pages[q]]
+        if quads.turned[q]:
+            tile = page[x0 + dy : x1 + dy, y0 + dx : y1 + dx].swapaxes(0, 1)
+        else:
+            tile = page[y0 + dy : y1 + dy, x0 + dx : x1 + dx]
         spot = color[y0:y1, x0:x1]
         free = (spot[..., 3] == 0) & (tile[..., 3] == 255)
         spot[free] = tile[free]

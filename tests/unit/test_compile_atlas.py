@@ -5,7 +5,7 @@ import pytest
 from farfield_core import faces as face_axes
 from farfield_core import placement
 from farfield_worker.compile.atlas import lay_out
-from farfield_worker.compile.layered import Rules, compile_face
+from farfield_worker.compile.layered import CompiledFace, Rules, cut, shown_texels
 from farfield_worker.compile.quads import layer_quads
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -17,10 +17,12 @@ HALF = (1.0, 1.0, 1.0)
 
 def compiled(seed, resolution, layers, grower, largest, numbers):
     rules = Rules(
-        placement.place(HALF, max(resolution, 16), layers).layers, resolution, 8, grower, largest
+        placement.place(HALF, max(resolution, 16), layers).layers, resolution, grower, largest
     )
     return rules.layers, {
-        number: compile_face(random_face(seed + number, resolution, layers + 1), rules, HALF)
+        number: cut(
+            shown_texels(random_face(seed + number, resolution, layers + 1), rules, HALF), rules
+        )
         for number in numbers
     }
 
@@ -28,7 +30,7 @@ def compiled(seed, resolution, layers, grower, largest, numbers):
 def columns_of(quads):
     """The columns of docs/format.md as arrays, corners (n, 4, 2)."""
     n = len(quads.faces)
-    assert quads.eyes == quads.turned == (0,) * n
+    assert quads.eyes == (0,) * n
     assert quads.corner_counts == (4,) * n
     assert quads.scales == (1.0,) * n
     corners = np.array(quads.corners).reshape(n, 4, 2)
@@ -60,7 +62,9 @@ def test_every_texel_is_found_back(seed, resolution, layers, grower, numbers):
         low, high = corners[q].min(axis=0).astype(int), corners[q].max(axis=0).astype(int)
         for row in range(low[1], high[1]):
             for column in range(low[0], high[0]):
-                x, y = np.array([column + 0.5, row + 0.5]) * quads.scales[q] + offsets[q]
+                at = np.array([column + 0.5, row + 0.5])
+                along = at[::-1] if quads.turned[q] else at
+                x, y = along * quads.scales[q] + offsets[q]
                 color = pages[quads.pages[q], int(np.floor(y)), int(np.floor(x))]
                 if color[3] >= 128:
                     key = (quads.layers[q], row * resolution + column)
@@ -97,6 +101,29 @@ def test_quads_go_round_and_lie_on_their_layer_front_to_back(seed, layers):
         np.testing.assert_allclose(depth, distances[on])
 
 
+def test_what_is_higher_than_wide_lies_down():
+    texel = np.arange(5, dtype=np.int32) * 16 + 3
+    color = np.arange(1, 6, dtype=np.uint32) | np.uint32(0xFF000000)
+    box = np.array([[0, 3, 0, 1, 5]], np.int32)
+    face = CompiledFace(texel, color, np.zeros(5, np.int32), box, 5, 0)
+    boxes, places, pages = lay_out({2: face}, 16, (16, 8))
+    quads = layer_quads(boxes, places, [10.0])
+    assert quads.turned == (1,)
+    assert pages[0, 1, 1:6, 0].tolist() == [1, 2, 3, 4, 5]
+
+
+def test_alike_lie_together():
+    """Rectangles of one size come in the order of their brightness, whatever their layer."""
+    levels = np.random.default_rng(1).permutation(20).astype(np.uint32)
+    texel = np.zeros(20, np.int32)
+    box = np.array([[n, 0, 0, 1, 1] for n in range(20)], np.int32)
+    face = CompiledFace(
+        texel, levels | np.uint32(0xFF000000), np.arange(20, dtype=np.int32), box, 20, 0
+    )
+    boxes, places, _ = lay_out({0: face}, 16, (64, 8))
+    np.testing.assert_array_equal(np.argsort(places.x), np.argsort(levels[boxes.layer]))
+
+
 def test_no_faces():
     boxes, places, pages = lay_out({}, 64, (32, 32))
     assert pages.shape == (0, 32, 32, 4)
@@ -109,8 +136,8 @@ def test_compile_face_keeps_what_was_rendered_in_front(grower):
     resolution = 70
     for seed in range(20):
         face = random_face(seed, resolution, 5)
-        rules = Rules(placement.place(HALF, 70, 4).layers, resolution, 8, grower, 1000)
-        out = compile_face(face, rules, HALF)
+        rules = Rules(placement.place(HALF, 70, 4).layers, resolution, grower, 1000)
+        out = cut(shown_texels(face, rules, HALF), rules)
         layer = out.boxes[out.owner, 0]
         assert (np.diff(layer.astype(np.int64) * resolution**2 + out.texel) > 0).all()
         assert out.rendered == int((face.layer < 4).sum())

@@ -87,9 +87,62 @@ def test_greedy(seed, layers, resolution, longest):
 def test_best(seed, layers, resolution, longest):
     planes = random_planes(seed, layers, resolution)
     texel, layer, owner, boxes = cut(best, planes, longest)
-    fill = fills(planes, texel, layer, owner, boxes, longest)
-    assert (fill >= best_module.FULL).all()
+    fills(planes, texel, layer, owner, boxes, longest)
+    assert len(texel) >= best_module.FULL * (boxes[:, 3] * boxes[:, 4]).sum()
     assert (np.diff(boxes[:, 0]) >= 0).all()
+    assert len(boxes) <= len(cut(greedy, planes, longest)[3])
+
+
+def around(i, j):
+    """The box (left, top, right, bottom) around two, and its area less theirs."""
+    box = (*np.minimum(i[:2], j[:2]), *np.maximum(i[2:], j[2:]))
+    return tuple(int(n) for n in box), area(box) - area(i) - area(j)
+
+
+def area(box):
+    return int((box[2] - box[0]) * (box[3] - box[1]))
+
+
+def plain_merge(boxes, texels, longest):
+    """Always the cheapest pair, found by comparing all with all; ends where `_merge` must."""
+    boxes = [(on, (x, y, x + w, y + h)) for on, x, y, w, h in boxes]
+    while True:
+        pairs = []
+        for n, (on, i) in enumerate(boxes):
+            for other, j in boxes[:n]:
+                box, added = around(i, j)
+                fits = box[2] - box[0] <= longest and box[3] - box[1] <= longest
+                if on == other and fits:
+                    pairs.append((added, on, box))
+        total = sum(area(box) for _, box in boxes)
+        if not pairs or (total + min(pairs)[0]) * best_module.FULL > texels:
+            return boxes
+        _, on, box = min(pairs)
+        inside = [other == on and around(box, j)[0] == box for other, j in boxes]
+        boxes = [b for b, gone in zip(boxes, inside, strict=True) if not gone] + [(on, box)]
+
+
+@given(seed=SEEDS, layers=st.integers(1, 2), resolution=st.integers(4, 12), longest=LONGEST)
+@settings(max_examples=60)
+def test_merging_against_the_plain_rule(seed, layers, resolution, longest):
+    """Which of two equally cheap merges comes first is free, so numbers may differ a little."""
+    planes = random_planes(seed, layers, resolution)
+    texel, _, _, boxes = cut(greedy, planes, longest)
+    merged = best_module._merge(boxes, len(texel), 1024, 2**30, longest, longest)
+    expected = plain_merge(boxes.tolist(), len(texel), longest)
+    assert len(merged) <= len(expected) * 1.1 + 2
+    assert len(expected) <= len(merged) * 1.1 + 2
+    assert len(texel) >= best_module.FULL * (merged[:, 3] * merged[:, 4]).sum()
+
+
+def test_the_cheapest_pair_goes_first():
+    """Two pairs of unit squares, the one apart by a gap, the other by two; room for one merge."""
+    boxes = np.array([[0, 0, 0, 1, 1], [0, 2, 0, 1, 1], [1, 0, 0, 1, 1], [1, 3, 0, 1, 1]], np.int32)
+    merged = best_module._merge(boxes, 4, 1024, 2**30, 1000, 1000)
+    assert sorted(merged.tolist()) == [[0, 0, 0, 3, 1], [1, 0, 0, 1, 1], [1, 3, 0, 1, 1]]
+    assert len(best_module._merge(boxes, 4, 1024, 0, 1000, 1000)) == 4
+    assert len(best_module._merge(boxes, 4, 1024, 2**30, 2, 1000)) == 4
+    assert len(best_module._merge(boxes, 4, 1, 2**30, 1000, 1000)) == 4
 
 
 @pytest.mark.parametrize("grower", [greedy, best])

@@ -6,7 +6,7 @@ import pytest
 from farfield_core.bake import create_bake
 from farfield_core.corridor import parse_corridor
 from farfield_core.errors import BadInputError
-from farfield_core.plan import plan
+from farfield_core.plan import Plan, plan
 from farfield_core.settings import BakeSettings
 from farfield_core.store import Store
 
@@ -23,9 +23,9 @@ CORRIDORS = {
 @pytest.mark.parametrize(
     "settings",
     [
+        BakeSettings(resolution=64, layers=7, quads="layers"),
         BakeSettings(resolution=64, layers=7),
-        BakeSettings(resolution=64, layers=7, quads="slanted"),
-        BakeSettings(resolution=64, near=20, quads="slanted"),
+        BakeSettings(resolution=64, near=20),
     ],
 )
 def test_a_plan_says_what_the_bake_has(name: str, settings: BakeSettings) -> None:
@@ -44,20 +44,23 @@ def test_following_the_ground_takes_one_cell_a_column() -> None:
 
 def test_near_chooses_the_layers() -> None:
     corridor = parse_corridor(CORRIDORS["box"])
-    planned = plan(scene_info(), corridor, BakeSettings(near=30, resolution=512))
+    planned = plan(scene_info(), corridor, BakeSettings(quads="layers", near=30))
     assert planned.near_field <= 30
-    fewer = BakeSettings(layers=planned.layers - 1)
+    fewer = BakeSettings(quads="layers", layers=planned.layers - 1)
     assert plan(scene_info(), corridor, fewer).near_field > 30
 
 
-def test_estimates_grow_with_what_they_depend_on() -> None:
+@pytest.mark.parametrize("quads", ["slanted", "layers"])
+def test_estimates_grow_with_what_they_depend_on(quads: str) -> None:
     corridor = parse_corridor(CORRIDORS["box"])
-    small = plan(scene_info(), corridor, BakeSettings(resolution=256, layers=16))
-    for more in (
-        BakeSettings(resolution=512, layers=16),
-        BakeSettings(resolution=256, layers=64),
-    ):
-        large = plan(scene_info(), corridor, more)
+
+    def estimate(**settings: object) -> Plan:
+        return plan(
+            scene_info(), corridor, BakeSettings.model_validate({"quads": quads, **settings})
+        )
+
+    small = estimate(resolution=256, layers=16)
+    for large in (estimate(resolution=512, layers=16), estimate(resolution=256, layers=64)):
         assert large.seconds > small.seconds > 0
         assert large.megabytes > small.megabytes > 0
         assert large.quads > small.quads > 0

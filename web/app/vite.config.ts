@@ -11,8 +11,16 @@ export default defineConfig({
     target: 'es2022',
     chunkSizeWarningLimit: 600, // three.js in one piece
     rolldownOptions: {
-      input: { index: 'index.html', walk: 'walk/index.html' },
-      output: { codeSplitting: { groups: [{ name: 'three', test: /node_modules\/three\// }] } },
+      input: {
+        index: 'index.html',
+        scene: 'scene/index.html',
+        bake: 'bake/index.html',
+        walk: 'walk/index.html',
+        objects: 'objects/index.html',
+      },
+      output: {
+        codeSplitting: { groups: [{ name: 'three', test: /node_modules\/three\/build\// }] },
+      },
     },
   },
 });

@@ -6,6 +6,7 @@ not run, such as one of the command line in the same store, is watched through i
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import threading
 import time
@@ -83,6 +84,8 @@ class Bakes:
         self._lock = threading.RLock()
         self._seen: dict[str, _Seen] = {}
         self._mine: set[str] = set()
+        self._created: dict[str, str] = {}
+        self.listeners: list[Listener] = []
         self._dispatcher = dispatcher(self._listen)
         self.walk = lru_cache(maxsize=64)(self._read_walk)
         self._grid: Callable[[str], CellGrid] = lru_cache(maxsize=4)(
@@ -96,13 +99,22 @@ class Bakes:
 
     def ids(self) -> list[str]:
         """All bakes, those asked for first coming first; those never asked for come last."""
-        found = []
+        return [key.rpartition(" ")[2] for key in self.order()]
+
+    def order(self) -> list[str]:
+        """All bakes as "<when asked for> <id>", sorted; "~" stands for never."""
+        keys = []
         for bake in self._store.folders("bakes/"):
-            if self._store.exists(f"bakes/{bake}/walk.json"):
+            if bake not in self._created:
+                if not self._store.exists(f"bakes/{bake}/walk.json"):
+                    continue
                 control = read_control(self._store, bake)
-                found.append((control is None, control.created if control else None, bake))
-        asked = sorted((created, bake) for none, created, bake in found if created is not None)
-        return [b for _, b in asked] + sorted(bake for none, _, bake in found if none)
+                if control is None:
+                    keys.append(f"~ {bake}")
+                    continue
+                self._created[bake] = control.created.isoformat()
+            keys.append(f"{self._created[bake]} {bake}")
+        return sorted(keys)
 
     def take_up(self) -> None:
         """Go on with everything that is wanted: what a server does when it starts."""
@@ -125,8 +137,7 @@ class Bakes:
     def progress(self, bake: str) -> Progress:
         """Where a bake stands; raises NotFoundError."""
         walk = self.walk(bake)
-        status = self._dispatcher.status(bake) if self._runs_here(bake) else self._watched(walk)
-        return Progress(walk, status, self._rate(bake))
+        return Progress(walk, self._status(walk), self._rate(bake))
 
     def pause(self, bake: str) -> None:
         """Begin no more cells; those under way are finished."""
@@ -237,6 +248,13 @@ class Bakes:
         if state not in states:
             raise NotNowError(f"Bake {bake} is {state}; there is nothing to {verb}.")
 
+    def _status(self, walk: Walk) -> BakeStatus:
+        if self._runs_here(walk.id):
+            # it may be on its way to the dispatcher
+            with contextlib.suppress(NotFoundError):
+                return self._dispatcher.status(walk.id)
+        return self._watched(walk)
+
     def _watched(self, walk: Walk) -> BakeStatus:
         """Status of a bake that this server does not run."""
         control = read_control(self._store, walk.id) or Control()
@@ -267,6 +285,8 @@ class Bakes:
 
     def _listen(self, event: Event) -> None:
         """Called by the dispatcher with everything that happens."""
+        for listener in self.listeners:
+            listener(event)
         if event.kind == "done" and event.cell is not None:
             with self._lock:
                 seen = self._look(event.bake)

@@ -8,6 +8,7 @@ from http import HTTPStatus
 from typing import Any
 
 from farfield_core import errors
+from farfield_core.store import StoreError
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
@@ -21,6 +22,18 @@ class NotNowError(errors.FarfieldError):
     """What was asked does not fit the state a thing is in."""
 
 
+class UploadGoneError(errors.FarfieldError):
+    """The upload did not go on for too long, or was taken back."""
+
+
+class NoSpaceError(errors.FarfieldError):
+    """The disk or the key's quota has no room for it."""
+
+
+class QuotaError(errors.FarfieldError):
+    """More than this server lets one client have."""
+
+
 #: exception -> HTTP status; the nearest class in an exception's order of bases decides
 STATUS: Mapping[type[Exception], HTTPStatus] = {
     NotNowError: HTTPStatus.CONFLICT,
@@ -28,6 +41,10 @@ STATUS: Mapping[type[Exception], HTTPStatus] = {
     errors.SceneRefusedError: HTTPStatus.UNPROCESSABLE_ENTITY,
     errors.NotFoundError: HTTPStatus.NOT_FOUND,
     errors.AlreadyExistsError: HTTPStatus.CONFLICT,
+    UploadGoneError: HTTPStatus.GONE,
+    NoSpaceError: HTTPStatus.INSUFFICIENT_STORAGE,
+    QuotaError: HTTPStatus.FORBIDDEN,
+    StoreError: HTTPStatus.SERVICE_UNAVAILABLE,
     errors.FarfieldError: HTTPStatus.INTERNAL_SERVER_ERROR,
 }
 
@@ -48,7 +65,7 @@ PROBLEMS: dict[int | str, dict[str, Any]] = {
         "description": HTTPStatus(code).phrase,
         "content": {"application/problem+json": {"schema": Problem.model_json_schema()}},
     }
-    for code in (404, 409, 413, 422)
+    for code in (400, 401, 403, 404, 408, 409, 410, 412, 413, 415, 422, 423, 429, 503, 507)
 }
 
 
@@ -65,11 +82,14 @@ def status_of(error: Exception) -> HTTPStatus:
     return HTTPStatus.INTERNAL_SERVER_ERROR
 
 
+_KNOWN = frozenset(HTTPStatus)
+
+
 def problem(
-    status: HTTPStatus, detail: str, headers: Mapping[str, str] | None = None
+    status: int, detail: str, headers: Mapping[str, str] | None = None, title: str = ""
 ) -> JSONResponse:
     """Build a problem-details response."""
-    body = Problem(title=status.phrase, status=status, detail=detail)
+    body = Problem(title=title or HTTPStatus(status).phrase, status=status, detail=detail)
     sent = {"Cache-Control": "no-store", **(headers or {})}
     return JSONResponse(
         body.model_dump(), status, headers=sent, media_type="application/problem+json"
@@ -95,6 +115,8 @@ async def _validation(_: Request, error: Exception) -> JSONResponse:
 
 async def _http(_: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, HTTPException)
+    if error.status_code not in _KNOWN:  # tus has one of its own, 460
+        return problem(error.status_code, str(error.detail), error.headers, "Checksum Mismatch")
     status = HTTPStatus(error.status_code)
     detail = str(error.detail)
     if detail == status.phrase:

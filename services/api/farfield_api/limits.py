@@ -18,7 +18,7 @@ class BodyLimit:
     Args:
         app: what is protected.
         limit: greatest size of a body, bytes.
-        others: limits of addresses that take more.
+        others: limits of addresses that take more; one that ends in a slash means all below it.
     """
 
     def __init__(self, app: ASGIApp, limit: int, others: Mapping[str, int]) -> None:
@@ -31,7 +31,9 @@ class BodyLimit:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        limit = self._others.get(scope["path"], self._limit)
+        path = scope["path"]
+        folder = path[: path.rfind("/") + 1]
+        limit = self._others.get(path, self._others.get(folder, self._limit))
         sentence = f"The request is larger than the {limit} bytes that this address takes."
         length = Headers(scope=scope).get("content-length", "0")
         if length.isdecimal() and int(length) > limit:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 import shutil
 import tempfile
+from functools import lru_cache
 from pathlib import Path
 from typing import BinaryIO, Literal, NamedTuple, Protocol
 
-from farfield_core import scenes
+from farfield_core import archives, scenes, sources
 from farfield_core.errors import SceneRefusedError
 from farfield_core.scene import SceneInfo
 from farfield_core.store import Store
@@ -24,6 +25,17 @@ def safe_name(name: str) -> str:
     return f"{stem[:100]}{dot}{suffix[:10]}"
 
 
+def check_name(name: str) -> str:
+    """A plain name of a model file or of a zip; raises SceneRefusedError for any other."""
+    plain = safe_name(name)
+    if not (sources.is_model(plain) or archives.is_archive(plain)):
+        known = ", ".join((*sources.SUFFIXES, ".zip"))
+        raise SceneRefusedError(
+            f"{plain or 'A file without a name'} cannot be read as a model; give one of {known}."
+        )
+    return plain
+
+
 class Described(NamedTuple):
     """A scene; `info` once it is ready, `reason` once it is refused."""
 
@@ -32,6 +44,7 @@ class Described(NamedTuple):
     state: Literal["preparing", "ready", "refused"]
     reason: str | None
     info: SceneInfo | None
+    orientation: scenes.Orientation
 
 
 class Preparer(Protocol):
@@ -56,22 +69,43 @@ class Scenes:
     def __init__(self, store: Store, preparer: Preparer) -> None:
         self._store = store
         self._preparer = preparer
+        # scene.json lists every block of a large scene, and never changes
+        self.info = lru_cache(maxsize=32)(lambda scene: scenes.scene_info(store, scene))
 
-    def add(self, name: str, file: BinaryIO) -> str:
-        """Keep a model file and have it prepared; returns its id.
+    def add(self, name: str, file: BinaryIO, work: Path) -> str:
+        """Keep a model file, or a zip with one, and have it prepared; returns its id.
 
-        Raises SceneRefusedError for what is no model file.
+        `work` is a folder for what is needed meanwhile. Raises SceneRefusedError for what is no
+        model file.
         """
-        with tempfile.TemporaryDirectory(prefix="farfield-upload-") as folder:
-            model = Path(folder) / safe_name(name)
-            if not model.suffix:
-                raise SceneRefusedError("The file needs a name with a suffix, such as model.glb.")
+        plain = check_name(name)
+        with tempfile.TemporaryDirectory(prefix=".arriving-", dir=work) as folder:
+            model = Path(folder) / plain
             with model.open("wb") as out:
                 shutil.copyfileobj(file, out, _CHUNK)
-            scene = scenes.import_source(self._store, model)
+            return self.take(model)
+
+    def take(self, file: Path) -> str:
+        """Keep a file that is ours, alone in its folder, and have it prepared; returns its id."""
+        model = file
+        if archives.is_archive(file.name):
+            inside = file.with_name("unpacked")
+            inside.mkdir()
+            model = archives.unpack_model(file, inside)
+        scene = scenes.import_source(self._store, model, owned=True)
+        self.prepare(scene)
+        return scene
+
+    def prepare(self, scene: str) -> None:
+        """Have a scene prepared unless that is done or was refused."""
         if scenes.scene_state(self._store, scene).state == "uploaded":
             self._preparer.submit(scene)
-        return scene
+
+    def reorient(self, scene: str, orientation: scenes.Orientation) -> str:
+        """The same model turned and scaled otherwise; returns that scene's id."""
+        turned = scenes.reorient(self._store, scene, orientation)
+        self.prepare(turned)
+        return turned
 
     def ids(self) -> list[str]:
         """All scenes."""
@@ -80,11 +114,13 @@ class Scenes:
     def describe(self, scene: str) -> Described:
         """A scene, and how far it has come; raises NotFoundError."""
         found = scenes.scene_state(self._store, scene)
+        said = scenes.orientation(self._store, scene)
         if found.state == "ready":
-            info = scenes.scene_info(self._store, scene)
-            return Described(scene, found.name, "ready", None, info)
+            info = self.info(scene)
+            return Described(scene, found.name, "ready", None, info, said)
         reason = found.reason if found.state == "refused" else self._preparer.error(scene)
-        return Described(scene, found.name, "refused" if reason else "preparing", reason, None)
+        state: Literal["refused", "preparing"] = "refused" if reason else "preparing"
+        return Described(scene, found.name, state, reason, None, said)
 
     def take_up(self) -> None:
         """Prepare what was uploaded before this server started."""

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from datetime import datetime
+from typing import Annotated, Any, Literal
 
 from farfield_core.corridor import Corridor
-from farfield_core.scene import Bounds
+from farfield_core.scene import Bounds, MapView, Suspicion
+from farfield_core.scenes import Orientation
 from farfield_core.settings import BakeSettings
 from pydantic import BaseModel, ConfigDict, Field
+
+from farfield_api.keys import KeyScope
 
 SCENE = "3f1c9a52d07be846"
 CORRIDOR = "9b0f6c1de2a34875"
 BAKE = "c4d07e9a1b5f3286"
+UPLOAD = "0d8f5e1b6c7a4932b1f0e9d8c7b6a594"
 
 BOX: dict[str, Any] = {"box": {"min": [-20.0, 0.0, -5.0], "max": [20.0, 4.0, 5.0]}}
 PATH: dict[str, Any] = {
@@ -37,12 +42,94 @@ class SceneBody(BaseModel):
     textures: int | None = Field(default=None, examples=[12])
     #: what was left out or guessed while reading
     notes: tuple[str, ...] = ()
+    #: how the model is turned and scaled, as somebody has said
+    orientation: Orientation = Orientation()
+    #: how it seems to be meant, where that is different
+    suspected: Suspicion | None = None
+    #: the top view at `map.png`; absent where the machine that prepared the scene cannot draw
+    map: MapView | None = None
 
 
 class SceneList(BaseModel):
-    """All scenes."""
+    """A page of scenes."""
 
     scenes: list[SceneBody]
+    #: the `cursor` to ask for next; null on the last page
+    next: str | None = None
+
+
+class SuggestionBody(BaseModel):
+    """A corridor to begin with."""
+
+    corridor: Corridor
+    #: edge length of its cells, metres
+    cell_size: float = Field(examples=[10.0])
+    #: height of a walker's eye, metres
+    eye_height: float = Field(examples=[1.7])
+
+
+class UploadBody(BaseModel):
+    """An upload, and what has become of it."""
+
+    id: str = Field(examples=[UPLOAD])
+    name: str = Field(examples=["town.glb"])
+    length: int = Field(examples=[153_000_000])
+    #: bytes that have arrived
+    offset: int = Field(examples=[153_000_000])
+    state: Literal["receiving", "importing", "done", "refused"]
+    #: the scene that was made of it
+    scene: str | None = Field(default=None, examples=[SCENE])
+    #: why none was
+    reason: str | None = None
+
+
+class KeyRequest(BaseModel):
+    """A key to make."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$", examples=["render-box"])
+    scope: KeyScope = Field(examples=["write"])
+
+
+class Rotation(BaseModel):
+    """How long a key works beside its successor."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    overlap_hours: float = Field(default=24.0, ge=0, le=24 * 90, examples=[24.0])
+
+
+class KeyBody(BaseModel):
+    """A key, but for itself."""
+
+    id: str = Field(examples=["5b2f9c3a7d10e864"])
+    name: str = Field(examples=["render-box"])
+    scope: KeyScope
+    created: datetime
+    #: when it ceases to work; null: never
+    expires: datetime | None = None
+
+
+class NewKey(KeyBody):
+    """A key that was just made."""
+
+    #: the key itself; it is told once and kept nowhere
+    key: str = Field(examples=["farfield_vJ8Q..."])
+
+
+class KeyList(BaseModel):
+    """All keys."""
+
+    keys: list[KeyBody]
+
+
+class Session(BaseModel):
+    """A key for the pages of this server."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    key: str = Field(pattern=r"^[!-~]{1,200}$", examples=["farfield_vJ8Q..."])
 
 
 class NewScene(BaseModel):
@@ -67,7 +154,7 @@ class BakeRequest(BaseModel):
 
     scene: str = Field(pattern=r"^[a-z0-9-]{1,64}$")
     #: a corridor file's content, or the id of one sent before
-    corridor: Corridor | str
+    corridor: Corridor | Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
     settings: BakeSettings = BakeSettings()
 
 
@@ -113,9 +200,11 @@ class BakeBody(BaseModel):
 
 
 class BakeList(BaseModel):
-    """All bakes."""
+    """A page of bakes."""
 
     bakes: list[BakeBody]
+    #: the `cursor` to ask for next; null on the last page
+    next: str | None = None
 
 
 class Focus(BaseModel):

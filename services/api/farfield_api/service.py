@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 import hashlib
+import tempfile
 from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
 
 from farfield_core import scenes as core_scenes
 from farfield_core.bake import create_bake
 from farfield_core.corridor import Corridor, Ground, parse_corridor
 from farfield_core.dispatch import Dispatcher, FarmView, Listener
 from farfield_core.errors import BadInputError, NotFoundError
-from farfield_core.ground import ground_of
+from farfield_core.ground import ground_under
+from farfield_core.plan import plan
 from farfield_core.scene import SceneInfo
 from farfield_core.settings import BakeSettings
 from farfield_core.store import Store
+from farfield_core.suggest import Suggestion, suggest_corridor
 
 from farfield_api.bakes import Bakes
-from farfield_api.exceptions import NotNowError
+from farfield_api.exceptions import NotNowError, QuotaError
+from farfield_api.idempotency import forget_old
+from farfield_api.keys import Keys
+from farfield_api.packed import PackedObjects
 from farfield_api.scenes import Preparer, Scenes
 from farfield_api.settings import ApiSettings
+from farfield_api.uploads import Uploads
 
 
 class FarfieldService:
@@ -33,8 +42,17 @@ class FarfieldService:
     ) -> None:
         self.settings = settings
         self.store = store
+        self.keys = Keys(store, settings.api_keys)
         self.scenes = Scenes(store, preparer)
+        self.uploads = Uploads(
+            _uploads_folder(settings, store),
+            self.scenes,
+            settings.upload_hours * 3600,
+            settings.quota_bytes,
+        )
         self.bakes = Bakes(store, dispatcher)
+        self.packed = PackedObjects(store)
+        self.suggestion = lru_cache(maxsize=64)(self._suggest)
 
     @property
     def farm(self) -> FarmView | None:
@@ -44,11 +62,14 @@ class FarfieldService:
 
     def take_up(self) -> None:
         """Go on where the server before this one stopped."""
+        forget_old(self.store)
         self.scenes.take_up()
+        self.uploads.take_up()
         self.bakes.take_up()
 
     def close(self) -> None:
         """Stop all work; the store knows what is left to do."""
+        self.uploads.close()
         self.scenes.close()
         self.bakes.close()
 
@@ -85,14 +106,32 @@ class FarfieldService:
         """What a corridor follows, where it does."""
         if not corridor.follow_ground:
             return None
-        return ground_of(core_scenes.open_prepared(self.store, scene))
+        return ground_under(core_scenes.open_prepared(self.store, scene), corridor)
+
+    def _suggest(self, scene: str) -> Suggestion:
+        """A corridor to begin with; raises as `ready_scene` does."""
+        self.ready_scene(scene)
+        return suggest_corridor(core_scenes.open_prepared(self.store, scene))
 
     def create_bake(self, scene: str, corridor: Corridor, settings: BakeSettings) -> str:
         """Write a bake's manifest and have it baked; returns its id."""
         info = self.ready_scene(scene)
+        most = self.settings.quota_cells
+        if most and (cells := plan(info, corridor, settings).cells) > most:
+            raise QuotaError(
+                f"The corridor has {cells} cells, more than the {most} that this server bakes in "
+                "one go; make it smaller, or its cells larger."
+            )
         walk = create_bake(self.store, info, corridor, settings)
         self.bakes.start(walk.id)
         return walk.id
+
+
+def _uploads_folder(settings: ApiSettings, store: Store) -> Path:
+    """Where uploads grow: best on the store's own disk, which then only links them."""
+    if settings.uploads:
+        return Path(settings.uploads)
+    return store.local_path("uploads") or Path(tempfile.gettempdir()) / "farfield-uploads"
 
 
 def _corridor_key(scene: str, corridor: str) -> str:

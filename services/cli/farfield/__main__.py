@@ -21,6 +21,11 @@ COMMANDS = {
     "serve": "Serve the API, the pages and baking.",
     "demo": "Bake a corridor and open the walk while it bakes.",
     "worker": "Bake cells for a farm.",
+    "export": "Write a walk as a static folder or as one zip.",
+    "upload": "Send a model to a server.",
+    "bakes": "List the bakes of a server.",
+    "watch": "Follow a bake of a server.",
+    "keys": "Make, list and end the API keys of a store.",
 }
 
 

@@ -40,6 +40,21 @@ store_option = click.option(
 )
 
 
+def server_options(function: Function) -> Function:
+    """Which server to speak to."""
+    server = click.option(
+        "--server",
+        envvar="FARFIELD_SERVER",
+        default="http://127.0.0.1:8000",
+        show_default=True,
+        help="Root of a Farfield server.",
+    )
+    key = click.option(
+        "--key", envvar="FARFIELD_KEY", default="", help="API key, where the server asks for one."
+    )
+    return server(key(function))
+
+
 def port_options(function: Function) -> Function:
     """Where a server listens."""
     host = click.option(

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
 from rich.progress import (
     BarColumn,
+    DownloadColumn,
     MofNCompleteColumn,
     Progress,
     ProgressColumn,
     Task,
     TextColumn,
     TimeRemainingColumn,
+    TransferSpeedColumn,
 )
 from rich.text import Text
 
@@ -37,6 +39,34 @@ def working(what: str) -> Iterator[None]:
     else:
         screen.print(what + " …")
         yield
+
+
+@contextmanager
+def bytes_progress(what: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar of bytes sent; gives the function to call with bytes sent and bytes in all."""
+    screen = console()
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        DownloadColumn(),
+        TransferSpeedColumn(),
+        TimeRemainingColumn(),
+        console=screen,
+        disable=not screen.is_terminal,
+    )
+    said = time.monotonic()
+
+    def tell(sent: int, total: int) -> None:
+        nonlocal said
+        bar.update(task, completed=sent, total=total)
+        now = time.monotonic()
+        if not screen.is_terminal and (sent == total or now - said > LINE_EVERY):
+            said = now
+            screen.print(f"{sent / 1e6:.1f} of {total / 1e6:.1f} MB")
+
+    with bar:
+        task = bar.add_task(what, total=None)
+        yield tell
 
 
 class _CellsPerSecond(ProgressColumn):
@@ -75,8 +105,14 @@ class CellProgress:
 
     def one_more(self) -> None:
         """A cell is done."""
-        self._done += 1
-        self._bar.advance(self._task)
+        self.update(self._done + 1)
+
+    def update(self, done: int) -> None:
+        """So many cells are done."""
+        if done <= self._done:
+            return
+        self._done = done
+        self._bar.update(self._task, completed=done)
         now = time.monotonic()
         last = self._done == self._total
         if not self._console.is_terminal and (last or now - self._said > LINE_EVERY):

@@ -18,7 +18,7 @@ from farfield_core import walk as walk_format
 from farfield_core.cells import CellGrid, Index, parse_cell_name
 from farfield_core.corridor import Corridor, Ground, cut
 from farfield_core.errors import BadInputError
-from farfield_core.ground import ground_of
+from farfield_core.ground import ground_under
 from farfield_core.placement import Placement
 from farfield_core.scene import SceneInfo
 from farfield_core.scenes import open_prepared
@@ -54,7 +54,7 @@ def create_bake(
     if store.exists(layout.walk_key(identity)):
         return read_walk(store, identity)
     if corridor.follow_ground and ground is None:
-        ground = ground_of(open_prepared(store, scene.id))
+        ground = ground_under(open_prepared(store, scene.id), corridor)
     grid = cut(corridor, settings.cell_size, ground)
     tables = cell_table_pages(grid)
     placement = settings.place() if settings.quads == "layers" else Placement((), ())

@@ -8,11 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from farfield_core.corridor import Floats, Ground
+from farfield_core.corridor import Corridor, Floats, Ground
 from farfield_core.scene import Block, PreparedScene
 
 Ints = NDArray[np.int64]
 
+#: highest step that a walker takes, as a share of the eye's height
+STEP = 0.2
 #: surfaces steeper than this are walls, not ground: cosine of 60 degrees
 UPRIGHT = 0.5
 #: (triangle, point) pairs looked at together
@@ -34,16 +36,24 @@ class Surfaces(NamedTuple):
     up: Floats
 
 
-def ground_of(scene: PreparedScene) -> Ground:
+def ground_under(scene: PreparedScene, corridor: Corridor) -> Ground:
+    """What a corridor through `scene` follows."""
+    return ground_of(scene, STEP * corridor.eye_height)
+
+
+def ground_of(scene: PreparedScene, step: float = 0.0) -> Ground:
     """The walkable surface of `scene` that lies nearest to a hinted height, as `corridor.cut` asks.
 
-    Walkable is what is less than 60 degrees steep, whichever way it faces.
+    Walkable is what is less than 60 degrees steep, whichever way it faces. What lies under another
+    such surface by no more than `step`, scene units, is buried, as a floor is under a stair or a
+    carpet: then that one is taken.
     """
 
     def ground(x: Floats, z: Floats, hint: Floats) -> Floats:
         hits = surfaces(scene, x, z)
         flat = np.abs(hits.up) > UPRIGHT
         line, y = hits.line[flat], hits.y[flat]
+        y = _unburied(line, y, step)
         order = np.lexsort((np.abs(y - hint[line]), line))
         line, y = line[order], y[order]
         first = np.ones(len(line), bool)
@@ -53,6 +63,15 @@ def ground_of(scene: PreparedScene) -> Ground:
         return heights
 
     return ground
+
+
+def _unburied(line: Ints, y: Floats, step: float) -> Floats:
+    """Heights (n,) of the topmost surfaces that are reached in steps up from each, by line."""
+    top = y.copy()
+    for n in range(len(y) - 2, -1, -1):
+        if line[n] == line[n + 1] and y[n + 1] - y[n] <= step:
+            top[n] = top[n + 1]
+    return top
 
 
 def surfaces(scene: PreparedScene, x: Floats, z: Floats) -> Surfaces:

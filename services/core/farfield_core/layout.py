@@ -58,3 +58,8 @@ def refused_key(scene: str) -> str:
 def scene_prefix(scene: str) -> str:
     """Folder of everything that belongs to a scene."""
     return f"scenes/{scene}/"
+
+
+def orientation_key(scene: str) -> str:
+    """How a scene's model is turned and scaled, where somebody has said so."""
+    return f"scenes/{scene}/orientation.json"

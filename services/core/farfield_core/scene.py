@@ -112,6 +112,14 @@ class MapView(_Model):
     max: tuple[float, float]
 
 
+class Suspicion(_Model):
+    """How a model seems to be meant, where that is not how it was read."""
+
+    up: Literal["y", "z"]
+    #: metres in one of the model's units
+    scale: float
+
+
 class SceneInfo(_Model):
     """scene.json."""
 
@@ -129,6 +137,8 @@ class SceneInfo(_Model):
     map: MapView | None = None
     #: what was left out or guessed while reading, a sentence each
     notes: tuple[str, ...] = ()
+    #: absent where the model seems to be upright and in metres
+    suspected: Suspicion | None = None
 
 
 @dataclass(frozen=True)

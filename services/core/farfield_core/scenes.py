@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
 
 from farfield_core import layout, sources
 from farfield_core.errors import NotFoundError
@@ -34,10 +38,41 @@ class SceneState:
     reason: str | None = None
 
 
-def import_source(store: Store, model: Path) -> str:
-    """Copy a model file and the files it names into the store; returns the scene's id.
+class Orientation(BaseModel):
+    """How a model's own coordinates become metres with y up.
 
-    The same bytes give the same scene. Raises SceneRefusedError for what is no model file.
+    Attributes:
+        up: which of the model's axes points up.
+        scale: metres in one of the model's units.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    up: Literal["y", "z"] = "y"
+    scale: float = Field(default=1.0, gt=0, le=1e6, allow_inf_nan=False)
+
+    def arguments(self) -> list[str]:
+        """Options of the process that prepares."""
+        if self == Orientation():
+            return []
+        return ["--up", self.up, "--scale", repr(self.scale)]
+
+
+class _Turned(BaseModel):
+    """orientation.json of a scene made of another one's model."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    of: str
+    by: Orientation
+
+
+def import_source(store: Store, model: Path, *, owned: bool = False) -> str:
+    """Take a model file and the files it names into the store; returns the scene's id.
+
+    Files that are `owned`, which nobody will write to, are linked where the store is a folder of
+    the same disk; others are copied. The same bytes give the same scene. Raises SceneRefusedError
+    for what is no model file.
     """
     files = sources.source_files(model)
     scene = sources.scene_id(files)
@@ -46,13 +81,65 @@ def import_source(store: Store, model: Path) -> str:
     for name, path in reversed(files.items()):
         if name == model.name and _model_name(store, scene) is not None:
             break
-        store.put_new(prefix + name, path)
+        _keep(store, prefix + name, path, link=owned)
     return scene
+
+
+def _keep(store: Store, key: str, data: Path | bytes, *, link: bool) -> None:
+    """Create an object."""
+    target = store.local_path(key)
+    if link and target is not None and isinstance(data, Path):
+        with suppress(OSError):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.hardlink_to(data)
+            return
+    store.put_new(key, data)
+
+
+def reorient(store: Store, scene: str, orientation: Orientation) -> str:
+    """The same model turned and scaled otherwise: a scene of its own; returns its id.
+
+    What was baked of the first stays as it is. Raises NotFoundError.
+    """
+    prefix = layout.source_prefix(scene)
+    keys = sorted(store.list(prefix), key=sources.is_model)
+    if not keys:
+        raise NotFoundError(f"There is no scene {scene} in the store.")
+    first = _root_of(store, scene)
+    if orientation == Orientation():
+        return first
+    text = f"{first} {orientation.model_dump_json()}"
+    turned = hashlib.sha256(text.encode()).hexdigest()[:16]
+    said = _Turned(of=first, by=orientation).model_dump_json().encode()
+    store.put_new(layout.orientation_key(turned), said)
+    for key in keys:
+        path = store.local_path(key)
+        target = layout.source_prefix(turned) + key.removeprefix(prefix)
+        _keep(store, target, store.get(key) if path is None else path, link=True)
+    return turned
+
+
+def orientation(store: Store, scene: str) -> Orientation:
+    """How a scene's model is turned and scaled while it is prepared."""
+    try:
+        data = store.get(layout.orientation_key(scene))
+    except NotFoundError:
+        return Orientation()
+    return parse(_Turned, data, f"The orientation of scene {scene}").by
+
+
+def _root_of(store: Store, scene: str) -> str:
+    """The scene as it was uploaded, of which this one is a turned copy or which it is."""
+    try:
+        data = store.get(layout.orientation_key(scene))
+    except NotFoundError:
+        return scene
+    return parse(_Turned, data, f"The orientation of scene {scene}").of
 
 
 def scene_ids(store: Store) -> list[str]:
     """All scenes of a store, sorted."""
-    return sorted({key.split("/")[1] for key in store.list("scenes/")})
+    return list(store.folders("scenes/"))
 
 
 def scene_state(store: Store, scene: str) -> SceneState:

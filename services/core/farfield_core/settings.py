@@ -18,15 +18,20 @@ class BakeSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    quads: Literal["layers", "slanted"] = Field(
-        default="layers",
-        description="kind of impostor quads: the paper's layers, or planes of any slant",
+    quads: Literal["slanted", "layers"] = Field(
+        default="slanted",
+        description="kind of impostor quads: planes of any slant, or the paper's layers",
     )
     cell_size: tuple[Positive, Positive, Positive] = Field(
         default=(10.0, 10.0, 10.0),
         description="edge lengths of a view cell, metres; one number means a cube",
     )
-    layers: int = Field(default=64, ge=1, le=4096, description="number of layers")
+    layers: int = Field(
+        default=64,
+        ge=1,
+        le=4096,
+        description="number of layers; slanted quads get the near field that so many layers have",
+    )
     near: Positive | None = Field(
         default=None,
         description="half width of the near field, metres; with layers it chooses their number, "
@@ -41,6 +46,11 @@ class BakeSettings(BaseModel):
         default=1.0,
         description="how many texels two neighbouring layers may shift by; none means no bound",
     )
+    gap_fill: Literal["paper", "steep"] = Field(
+        default="steep",
+        description="gaps to fill: those between neighbouring layers only, as the paper does, or "
+        "those where a steep surface skips layers too",
+    )
     tolerance: Annotated[float, Field(gt=0, le=1)] = Field(
         default=0.68, description="share of the parallax bound that slanted quads use"
     )
@@ -52,8 +62,10 @@ class BakeSettings(BaseModel):
     grower: Literal["greedy", "best"] = Field(
         default="best", description="how texels are gathered into quads"
     )
-    visibility: Literal["on", "off"] = Field(
-        default="on", description="leave out what no eye in the cell can see"
+    visibility: Literal["on", "off", "fast", "careful"] = Field(
+        default="on",
+        description="leave out what no eye in the cell can see; fast and careful sample fewer and "
+        "more eyes",
     )
     encoder: Literal["png", "webp"] = Field(default="png", description="format of atlas pages")
     supersample: int = Field(
@@ -75,6 +87,20 @@ class BakeSettings(BaseModel):
                 f"near {self.near:g} lies inside the cell; "
                 f"use more than {max(self.cell_size) / 2:g}"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _only_for_layers(self) -> BakeSettings:
+        if self.quads == "slanted":
+            for name, value, default in (
+                ("grower", self.grower, "best"),
+                ("supersample", self.supersample, 1),
+                ("renderer", self.renderer, "moderngl"),
+            ):
+                if value != default:
+                    raise ValueError(
+                        f"{name} {value} is for layers; choose layers for quads, or leave it out"
+                    )
         return self
 
     @property

@@ -14,6 +14,9 @@ from farfield_core.scene import Bounds, Triple
 
 VERSION: Literal[1] = 1
 
+#: near polygons are drawn up to this multiple of `near_field`, so that no crack opens there
+OVERLAP = 17 / 16
+
 
 Count = Annotated[int, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]
@@ -118,6 +121,11 @@ class Walk(_Model):
     light: dict[str, Triple]
     places: Places = Places()
     start: Start
+
+    @property
+    def near_drawn(self) -> float:
+        """Half width of the cube to which near polygons are clipped, metres."""
+        return self.near_field * OVERLAP
 
 
 class Quads(_Model):

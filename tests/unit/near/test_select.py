@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from farfield_core.scene import PreparedScene
-from farfield_worker.near import near_list
+from farfield_worker.near import near_list, near_triangles
 from farfield_worker.near.select import cube_meets, runs
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -58,25 +58,16 @@ def test_overlap_of_a_triangle_around_the_cube():
         assert slow_meets(moved, 1.0) == expected
 
 
-def slow_runs(chosen: list[bool], gap: int) -> list[bool]:
-    """Which entries are listed: chosen ones, and holes of fewer than `gap` between chosen ones."""
-    listed = list(chosen)
-    places = [n for n, keep in enumerate(chosen) if keep]
-    for left, right in pairwise(places):
-        if right - left - 1 < gap:
-            listed[left:right] = [True] * (right - left)
-    return listed
-
-
-@given(st.lists(st.booleans(), max_size=60), st.integers(1, 5))
-def test_runs(chosen, gap):
-    found = runs(np.array(chosen, np.bool_), gap)
+@given(st.lists(st.booleans(), max_size=60))
+def test_runs(chosen):
+    found = runs(np.array(chosen, np.bool_))
     listed = [False] * len(chosen)
     for first, count in found:
         assert count > 0
         listed[first : first + count] = [True] * count
-    assert listed == slow_runs(chosen, gap)
-    assert found == sorted(found)
+    assert listed == chosen
+    for (first, count), (following, _) in pairwise(found):
+        assert first + count < following
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +105,7 @@ def test_near_list_is_complete_and_tight(scene, eye, half_width):
     expected = np.array([slow_meets(t, half_width) for t in triangles])
     listed = np.zeros(len(triangles), np.bool_)
     total = 0
-    for entry in near_list(scene, np.array(eye, np.float64), half_width):
+    for entry in near_list(scene, near_triangles(scene, np.array(eye, np.float64), half_width)):
         block = scene.info.blocks[entry.block]
         total += entry.triangles
         rows = np.array(entry.ranges).reshape(-1, 3)
@@ -128,10 +119,22 @@ def test_near_list_is_complete_and_tight(scene, eye, half_width):
             listed[start : start + count] = True
     assert not (expected & ~listed).any()
     assert total == listed.sum()
-    # the only excess is in closed gaps, each shorter than 16
     assert expected.sum() > 0
-    assert (listed & ~expected).sum() <= 16 * expected.sum()
+    # where a hair decides, either answer will do
+    assert (listed & ~expected).sum() <= 2
+
+
+def test_only_some_are_listed(scene):
+    inside = near_triangles(scene, np.array([1000.0, 0, 0]), 5.0)
+    some = inside[np.random.default_rng(2).random(len(inside)) < 0.3]
+    listed = []
+    for entry in near_list(scene, some):
+        block = scene.info.blocks[entry.block]
+        for primitive, first, count in np.array(entry.ranges).reshape(-1, 3).tolist():
+            start = block.parts[primitive].first_triangle + first
+            listed += range(start, start + count)
+    assert listed == some.tolist()
 
 
 def test_nothing_near(scene):
-    assert near_list(scene, np.array([1000.0, 500, 0]), 10.0) == []
+    assert near_list(scene, near_triangles(scene, np.array([1000.0, 500, 0]), 10.0)) == []

@@ -12,11 +12,28 @@ from farfield_worker.slanted.fragments import Fragments, sort_fragments
 from farfield_worker.slanted.near_border import inside, walls
 from farfield_worker.slanted.planes import seeds
 from farfield_worker.slanted.quads import texel_points, texel_uv
+from farfield_worker.visibility.clusters import ByBatch, Clusters, InView
+from numpy.typing import NDArray
 
 from tests.unit.scenes import SceneWriter, random_scene
-from tests.unit.visibility.test_maps import AllClusters
 
+Floats = NDArray[np.float64]
 RESOLUTION = 64
+
+
+class AllClusters(Clusters):
+    """Drops nothing."""
+
+    def in_view(self, eye: Floats, face: int, nearest: float, resolution: int) -> InView:
+        n = len(self.runs)
+        rect = np.tile(np.array([0, 0, resolution, resolution], np.int32), (n, 1))
+        triangles = self.runs[:, 2].astype(np.int32)
+        return InView(np.arange(n, dtype=np.int32), triangles, rect, np.full(n, 1e9, np.float32))
+
+    def triangles(
+        self, clusters: InView, eye: Floats, face: int, nearest: float, resolution: int
+    ) -> ByBatch:
+        return self.by_batch(np.arange(self.runs[:, 2].sum(), dtype=np.int32))
 
 
 def test_sorting_is_by_texel_then_depth_then_row() -> None:

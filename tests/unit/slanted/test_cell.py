@@ -96,7 +96,7 @@ def test_the_painter_draws_what_rays_meet(baked: tuple[PreparedScene, SlantedCel
     for part in cell.parts:
         painter.add(part.face, part.eye, part.quads)
     eye, face = np.array([1.0, 0.7, -1.2]), 4
-    shown, color = painter.draw(face, eye)
+    shown, color = painter.picture(face, eye)
     painter.close()
     c = texel_centres(RESOLUTION)
     u, v = np.meshgrid(c, c)
@@ -142,8 +142,7 @@ def test_residual_texels_by_loops() -> None:
     shown = np.where(rng.random((size, size)) < 0.6, truth, rng.choice([0, 0.015], (size, size)))
     far = (truth > 0) & (rng.random((size, size)) < 0.9)
     tolerance = Tolerance.of(4, np.array([2.0, 1.5, 2.5]), HALF, 5e-3, 8.0)
-    empty_map = np.zeros((size, size), np.uint32)
-    depth_map = DepthMap(truth.astype(np.float32), empty_map, empty_map.astype(np.int32))
+    depth_map = DepthMap(truth.astype(np.float32), np.zeros((size, size), np.int32))
     got = residual_texels(depth_map, shown.astype(np.float32), tolerance, far)
 
     def around(y: int, x: int) -> list[tuple[int, int]]:
@@ -186,8 +185,10 @@ def test_residual_quads_show_what_the_centre_sees_edge_on(tmp_path: Path) -> Non
     fine = 4 * RESOLUTION
     baker = SlantedBaker(scene, fine)
     eye = np.array([-1.4, 0.3, -1.0])  # quads have one colour on both sides
-    truth = baker.maps.map(eye, 4)
-    red = far_texels(truth, 4, eye, SETTINGS.near) & (truth.color & 0xFF00 == 0)
+    everything = np.arange(scene.info.triangles, dtype=np.int32)
+    truth = baker.renderer.picture(eye, 4, everything)
+    far = far_texels(baker.maps.map(eye, 4), 4, eye, SETTINGS.near)
+    red = far & (truth.disparity > 0) & (truth.color & 0xFF00 == 0)
     assert red.sum() > 100
     shares = {}
     for residual in (False, True):
@@ -196,7 +197,7 @@ def test_residual_quads_show_what_the_centre_sees_edge_on(tmp_path: Path) -> Non
         painter = QuadPainter(fine)
         for part in cell.parts:
             painter.add(part.face, part.eye, part.quads)
-        _, color = painter.draw(4, eye)
+        _, color = painter.picture(4, eye)
         painter.close()
         shares[residual] = (color[red] == truth.color[red]).mean()
     baker.close()

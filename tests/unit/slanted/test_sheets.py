@@ -139,7 +139,8 @@ def test_match_is_the_first_fragment_allowed(seen: Seen) -> None:
     starts = texel_starts(seen.texel, RESOLUTION)
     rng = np.random.default_rng(len(seen.texel))
     owner = rng.integers(-1, 2, len(seen.texel)).astype(np.int32)
-    grid = Grid(starts, seen.disparity, low, high, owner, RESOLUTION)
+    open_low = np.where(owner < 0, low, np.inf)
+    grid = Grid(starts, seen.disparity, open_low, high, owner, RESOLUTION)
     for row in rng.choice(len(seen.triangles.plane), 5):
         plane = seen.triangles.plane[row]
         for texel in np.unique(seen.texel)[:200]:

@@ -8,9 +8,8 @@ from farfield_core.faces import FACES, directions, project, texel_centres
 from farfield_core.scene import PreparedScene
 from farfield_worker.render.plain import PlainRenderer
 from farfield_worker.slanted.tolerance import Tolerance
-from farfield_worker.visibility.clusters import Clusters, InView
 from farfield_worker.visibility.depth_maps import NEAREST, DepthMap, DepthMapRenderer, MapCache
-from farfield_worker.visibility.from_region import cell_eyes, farthest_around, seen, triangles_seen
+from farfield_worker.visibility.from_region import cell_eyes, seen, triangles_seen
 from farfield_worker.visibility.spread import STEP, spread
 from hypothesis import given
 from hypothesis import strategies as st
@@ -22,47 +21,21 @@ Floats = NDArray[np.float64]
 RESOLUTION = 64
 
 
-class AllClusters(Clusters):
-    """Drops nothing."""
-
-    def in_view(self, eye: Floats, face: int, nearest: float, resolution: int) -> InView:
-        n = len(self.runs)
-        rect = np.tile(np.array([0, 0, resolution, resolution], np.int32), (n, 1))
-        triangles = self.runs[:, 2].astype(np.int32)
-        return InView(np.arange(n, dtype=np.int32), triangles, rect, np.full(n, 1e9, np.float32))
-
-    def not_hidden(self, clusters: InView, drawn: NDArray[np.float32]) -> InView:
-        return clusters
-
-    def triangles(self, clusters, eye, face, nearest, resolution):  # type: ignore[no-untyped-def]
-        batch = self.runs[clusters.cluster, 0]
-        ids = [
-            np.concatenate(
-                [np.arange(f, f + n) for _, f, n in self.runs[clusters.cluster[batch == b]]] or [[]]
-            )
-            for b in range(self._batches)
-        ]
-        starts = np.cumsum([0, *map(len, ids)]).astype(np.int32)
-        kept = np.concatenate(ids).astype(np.int32)
-        return self._indices[kept], kept, starts
-
-
 @pytest.mark.usefixtures("graphics")
 @pytest.mark.parametrize("seed", range(6))
-def test_culling_drops_nothing_that_shows(tmp_path: Path, seed: int) -> None:
+def test_maps_show_what_a_picture_of_everything_shows(tmp_path: Path, seed: int) -> None:
     scene = random_scene(tmp_path / "prepared", seed, 2400, origin=(1000.0, 0.0, -2000.0))
     eye = scene.origin + np.array([0.31, 0.12, -0.77])
-    culled = DepthMapRenderer(scene, RESOLUTION)
-    everything = DepthMapRenderer(scene, RESOLUTION, AllClusters(scene))
+    maps = DepthMapRenderer(scene, RESOLUTION)
     for face in range(6):
-        ours, oracle = culled.map(eye, face), everything.map(eye, face)
-        np.testing.assert_array_equal(ours.disparity, oracle.disparity)
-        np.testing.assert_array_equal(ours.color, oracle.color)
+        ours = maps.map(eye, face)
+        oracle = maps.picture(eye, face, np.arange(scene.info.triangles, dtype=np.int32))
+        # two rasterisers differ by a texel here and there along outlines
+        same = np.abs(ours.disparity - oracle.disparity) <= 1e-4 * oracle.disparity
+        assert same.mean() > 0.995
         # of two triangles at one depth either may win
-        same = ours.triangle == oracle.triangle
-        assert same.mean() > 0.98
-    culled.close()
-    everything.close()
+        assert (ours.triangle == oracle.triangle).mean() > 0.98
+    maps.close()
 
 
 @pytest.mark.usefixtures("graphics")
@@ -70,25 +43,30 @@ def test_a_map_is_the_nearest_surface(tmp_path: Path) -> None:
     scene = random_scene(tmp_path / "prepared", 11)
     eye = scene.origin + np.array([0.3, 0.2, -0.7])
     maps, plain = DepthMapRenderer(scene, RESOLUTION), PlainRenderer(scene)
+    everything = np.arange(scene.info.triangles, dtype=np.int32)
     for face in range(6):
-        ours = maps.map(eye, face)
+        ours, picture = maps.map(eye, face), maps.picture(eye, face, everything)
         texels = plain.face(eye, face, [NEAREST], RESOLUTION)
-        assert np.array_equal(np.flatnonzero(ours.disparity), texels.texel)
-        shown = ours.disparity.reshape(-1)[texels.texel]
-        np.testing.assert_allclose(1 / shown, texels.depth, rtol=1e-5)
-        colors = ours.color.reshape(-1)[texels.texel].view(np.uint8).reshape(-1, 4)
+        assert np.array_equal(np.flatnonzero(picture.disparity), texels.texel)
+        colors = picture.color.reshape(-1)[texels.texel].view(np.uint8).reshape(-1, 4)
         assert (np.abs(colors.astype(int) - texels.color) <= 1).all(axis=1).mean() > 0.98
+        shown = np.zeros(RESOLUTION**2)
+        shown[texels.texel] = 1 / texels.depth
+        same = np.abs(ours.disparity.reshape(-1) - shown) <= 1e-4 * shown
+        assert same.mean() > 0.99
         # the triangle's own plane has that disparity there
+        there = np.flatnonzero(ours.disparity)
         c = texel_centres(RESOLUTION)
-        rays = directions(face, c[texels.texel % RESOLUTION], c[texels.texel // RESOLUTION])
-        ids = ours.triangle.reshape(-1)[texels.texel]
+        rays = directions(face, c[there % RESOLUTION], c[there // RESOLUTION])
+        ids = ours.triangle.reshape(-1)[there]
         assert np.all(ids >= 0)
         assert np.all(ours.triangle.reshape(-1)[ours.disparity.reshape(-1) == 0] == -1)
         corners = scene.positions[scene.triangles[ids]].astype(float) + scene.origin - eye
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         plane = np.einsum("ij,ij->i", normal, corners[:, 0])
         d = np.einsum("ij,ij->i", normal, rays) / np.where(plane == 0, 1, plane)
-        assert np.mean(np.abs(d - shown) <= 1e-3 * shown) > 0.97
+        drawn = ours.disparity.reshape(-1)[there]
+        assert np.mean(np.abs(d - drawn) <= 1e-3 * drawn) > 0.97
     maps.close()
     plain.close()
 
@@ -103,8 +81,7 @@ class Counting:
 
     def map(self, eye: Floats, face: int) -> DepthMap:
         self.asked.append((tuple(eye), face))
-        zeros = np.zeros((4, 4))
-        return DepthMap(zeros.astype(np.float32), zeros.astype(np.uint32), zeros.astype(np.int32))
+        return DepthMap(np.zeros((4, 4), np.float32), np.zeros((4, 4), np.int32))
 
 
 def test_neighbouring_cells_share_corner_maps() -> None:
@@ -148,8 +125,7 @@ class Walls:
                     axis=-1,
                 )
                 d = np.where(inside & (t > 0), np.maximum(d, 1 / t), d)
-        shape = (self.resolution, self.resolution)
-        return DepthMap(d.astype(np.float32), np.zeros(shape, np.uint32), np.zeros(shape, np.int32))
+        return DepthMap(d.astype(np.float32), np.zeros(d.shape, np.int32))
 
 
 def test_seen_equals_a_plain_loop() -> None:
@@ -165,26 +141,18 @@ def test_seen_equals_a_plain_loop() -> None:
     want = np.zeros(600, bool)
     for eye in eyes:
         for face in range(6):
-            near = farthest_around(maps.map(eye, face).disparity)
+            near = maps.map(eye, face).disparity
             u, v, z = project(face, eye, points)
             for i in range(600):
                 if z[i] > 0 and abs(u[i]) <= 1 and abs(v[i]) <= 1:
                     column, row = (min(int((t + 1) * 16), 31) for t in (u[i], v[i]))
-                    want[i] |= near[row, column] <= 1 / z[i] + slack[i]
+                    around = near[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
+                    want[i] |= around.min() <= 1 / z[i] + slack[i]
     got = seen(points, slack, eyes, maps)
     assert 0 < want.sum() < 600
     assert np.array_equal(got, want)
     known = rng.random(600) < 0.5
     assert np.array_equal(seen(points, slack, eyes, maps, known), want | known)
-
-
-def test_farthest_around_by_loops() -> None:
-    values = np.random.default_rng(0).random((7, 5)).astype(np.float32)
-    want = [
-        [values[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2].min() for x in range(5)]
-        for y in range(7)
-    ]
-    assert np.array_equal(farthest_around(values), np.array(want))
 
 
 @pytest.mark.usefixtures("graphics")

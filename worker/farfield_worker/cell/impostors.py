@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple, Protocol
 
@@ -11,6 +11,8 @@ import numpy as np
 from farfield_core.scene import Triple
 from farfield_core.walk import Quads
 from numpy.typing import NDArray
+
+from farfield_worker.visibility.sampling import Watcher
 
 
 class Impostors(NamedTuple):
@@ -48,14 +50,23 @@ class Stopwatch:
         return out | {"seconds": sum(self._seconds.values())}
 
 
+#: shows what the cell's eyes see to the watchers given, and to those of the near polygons
+Look = Callable[[Sequence[Watcher]], None]
+
+
 class ImpostorMaker(Protocol):
     """Makes the impostors of one cell after the other."""
 
     #: GL vendor and renderer string, for logs
     name: str
 
-    def make(self, centre: NDArray[np.float64], watch: Stopwatch) -> Impostors:
-        """Impostors of the cell around `centre` (3,), scene coordinates."""
+    def make(
+        self, centre: NDArray[np.float64], watch: Stopwatch, look: Look | None = None
+    ) -> Impostors:
+        """Impostors of the cell around `centre` (3,), scene coordinates.
+
+        `look` is to be called once; it is None where visibility is off.
+        """
         ...
 
     def close(self) -> None:

@@ -11,7 +11,7 @@ from farfield_core.settings import BakeSettings
 from farfield_core.walk import Quads, Walk
 from numpy.typing import NDArray
 
-from farfield_worker.cell.impostors import Impostors, Stopwatch, triple
+from farfield_worker.cell.impostors import Impostors, Look, Stopwatch, triple
 from farfield_worker.compile.dilate import dilate
 from farfield_worker.compile.pack import GUTTER, Places, pack
 from farfield_worker.gl import context as gl
@@ -29,7 +29,7 @@ class SlantedImpostors:
     def __init__(self, scene: PreparedScene, walk: Walk, settings: BakeSettings) -> None:
         self.walk = walk
         self._baker = SlantedBaker(
-            scene, walk.resolution, max(8, _CACHE // (12 * walk.resolution**2))
+            scene, walk.resolution, max(8, _CACHE // (8 * walk.resolution**2))
         )
         with gl.current() as context:
             self.name = gl.device_name(context)
@@ -43,13 +43,15 @@ class SlantedImpostors:
             resolution=walk.resolution,
             tolerance=settings.tolerance,
             faces=face_axes.SIDES if settings.faces == "sides" else face_axes.ALL,
-            visibility=settings.visibility == "on",
+            visibility=settings.visibility != "off",
             segment=SegmentSettings(largest=largest),
         )
 
-    def make(self, centre: NDArray[np.float64], watch: Stopwatch) -> Impostors:
+    def make(
+        self, centre: NDArray[np.float64], watch: Stopwatch, look: Look | None = None
+    ) -> Impostors:
         """Impostors of the cell around `centre` (3,), scene coordinates."""
-        cell = self._baker.cell(centre, self._settings, watch)
+        cell = self._baker.cell(centre, self._settings, watch, look)
         with watch("compile"):
             size = (self.walk.atlas.width, self.walk.atlas.height)
             images = [image for part in cell.parts for image in part.quads.images]

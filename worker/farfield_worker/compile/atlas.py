@@ -1,4 +1,8 @@
-"""Compiled faces as atlas pages: order, pack, copy the texels, continue colours."""
+"""Compiled faces as atlas pages: order, pack, copy the texels, continue colours.
+
+Pages are laid out for the encoder: rectangles lie down, so that rows are long, and those of one
+height are next to others as bright.
+"""
 
 from __future__ import annotations
 
@@ -29,19 +33,40 @@ def lay_out(
     table = np.concatenate([np.empty((0, 6), np.int32), *columns])
     boxes = Rectangles(*(np.ascontiguousarray(column) for column in table.T))
     order = boxes.front_to_back()
+    boxes = boxes.take(order)
     rank = np.empty(len(order), np.intp)
     rank[order] = np.arange(len(order))
-    boxes = boxes.take(order)
+    first = np.cumsum([0, *(len(face.boxes) for face in faces.values())])
+    parts = list(zip(first, faces.values(), strict=False))
+    texel, color, owner = (
+        np.concatenate([np.empty(0, kind), *arrays])
+        for kind, arrays in (
+            (np.int32, [face.texel for _, face in parts]),
+            (np.uint32, [face.color for _, face in parts]),
+            (np.intp, [rank[start + face.owner] for start, face in parts]),
+        )
+    )
     width, height = page_size
-    places = pack(boxes.width, boxes.height, width, height)
+    turned = boxes.turned
+    long, short = np.maximum(boxes.width, boxes.height), np.minimum(boxes.width, boxes.height)
+    shelf = np.argsort(brightness(color, owner, len(order)))
+    places = Places(*(np.empty(len(order), np.int32) for _ in range(3)))
+    for placed, found in zip(places, pack(long[shelf], short[shelf], width, height), strict=True):
+        placed[shelf] = found
     pages = np.zeros((int(places.page.max(initial=-1)) + 1, height, width), np.uint32)
-    first = 0
-    for face in faces.values():
-        at = rank[first + face.owner]
-        row, column = np.divmod(face.texel, resolution)
-        y = places.y[at] + row - boxes.y[at]
-        x = places.x[at] + column - boxes.x[at]
-        pages[places.page[at], y, x] = face.color
-        first += len(face.boxes)
-    dilate(pages, places.page, places.x, places.y, boxes.width, boxes.height)
+    row, column = np.divmod(texel, resolution)
+    down, across = row - boxes.y[owner], column - boxes.x[owner]
+    y = places.y[owner] + np.where(turned[owner], across, down)
+    x = places.x[owner] + np.where(turned[owner], down, across)
+    pages[places.page[owner], y, x] = color
+    dilate(pages, places.page, places.x, places.y, long, short)
     return boxes, places, pages.view(np.uint8).reshape(len(pages), height, width, 4)
+
+
+def brightness(
+    color: NDArray[np.uint32], owner: NDArray[np.intp], count: int
+) -> NDArray[np.float64]:
+    """Mean of the sum of red, green and blue in each of `count` rectangles."""
+    red, green, blue = color & 255, color >> 8 & 255, color >> 16 & 255
+    total = np.bincount(owner, weights=red + green + blue, minlength=count)
+    return np.asarray(total / np.bincount(owner, minlength=count), np.float64)

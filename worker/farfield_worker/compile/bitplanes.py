@@ -8,6 +8,8 @@ the face every bit is 0.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -21,7 +23,7 @@ def empty(layers: int, resolution: int) -> Planes:
 
 
 @njit(cache=True)
-def put(planes, texel, layer):
+def put(planes: Any, texel: Any, layer: Any) -> None:
     """Set the bits of texels (n,) int32 (row * resolution + column) on layers (n,) int16."""
     resolution = planes.shape[1]
     for n in range(texel.size):
@@ -30,43 +32,69 @@ def put(planes, texel, layer):
 
 
 @njit(cache=True)
-def get(planes, texel, layer):
-    """Return the bits of texels (n,) int32 on layers (n,) int16, as (n,) bool."""
-    resolution = planes.shape[1]
-    out = np.empty(texel.size, np.bool_)
-    for n in range(texel.size):
-        row, column = divmod(texel[n], resolution)
-        word = planes[layer[n], row, column >> 6]
-        out[n] = (word >> np.uint64(column & 63)) & np.uint64(1) != 0
-    return out
+def _list(planes: Any, texel: Any, layer: Any) -> int:
+    """Write the set bits' texels and layers, in order; returns their number."""
+    layers, resolution, words = planes.shape
+    count = 0
+    for i in range(layers):
+        for row in range(resolution):
+            for word in range(words):
+                left, column = planes[i, row, word], word * 64
+                while left != 0:
+                    if left & np.uint64(1):
+                        texel[count], layer[count] = row * resolution + column, i
+                        count += 1
+                    left >>= np.uint64(1)
+                    column += 1
+    return count
 
 
 def listed(planes: Planes) -> tuple[NDArray[np.int32], NDArray[np.int16]]:
     """Texels and layers of all set bits, (n,) int32 and (n,) int16, in order of (layer, texel)."""
-    _, resolution, words = planes.shape
-    flat = planes.reshape(-1)
-    at = np.flatnonzero(flat)
-    octets = flat[at].astype("<u8").view(np.uint8).reshape(-1, 8)
-    which, bit = np.nonzero(np.unpackbits(octets, axis=1, bitorder="little"))
-    line, word = np.divmod(at[which], words)
-    layer, row = np.divmod(line, resolution)
-    return (row * resolution + word * 64 + bit).astype(np.int32), layer.astype(np.int16)
+    count = int(np.bitwise_count(planes).sum())
+    texel, layer = np.empty(count, np.int32), np.empty(count, np.int16)
+    _list(planes, texel, layer)
+    return texel, layer
 
 
-def erode(plane: Planes, down: int, across: int) -> Planes:
+@njit(cache=True)
+def erode(plane: Any, down: int, across: int) -> Any:
     """Bits whose whole neighbourhood of `down` rows and `across` columns either way is set.
 
-    `plane` is (R, words); the neighbourhood is (2 down + 1) x (2 across + 1) texels and never
-    whole beyond the face's edge.
+    `plane` is (R, words) uint64; the neighbourhood is (2 down + 1) x (2 across + 1) texels and
+    never whole beyond the face's edge.
     """
+    rows, words = plane.shape
     one, top = np.uint64(1), np.uint64(63)
     for _ in range(down):
         inner = np.zeros_like(plane)
-        np.bitwise_and(plane[:-2], plane[2:], out=inner[1:-1])
-        plane = inner & plane
+        for row in range(1, rows - 1):
+            for word in range(words):
+                inner[row, word] = plane[row - 1, word] & plane[row, word] & plane[row + 1, word]
+        plane = inner
     for _ in range(across):
-        right, left = plane << one, plane >> one
-        right[:, 1:] |= plane[:, :-1] >> top
-        left[:, :-1] |= plane[:, 1:] << top
-        plane = right & left & plane
+        inner = np.empty_like(plane)
+        for row in range(rows):
+            for word in range(words):
+                here = plane[row, word]
+                before = plane[row, word - 1] >> top if word > 0 else np.uint64(0)
+                after = plane[row, word + 1] << top if word + 1 < words else np.uint64(0)
+                inner[row, word] = (here << one | before) & here & (here >> one | after)
+        plane = inner
+    return plane
+
+
+def dilate(plane: Planes, rings: int) -> Planes:
+    """Bits with a set bit at most `rings` rows and columns away; `plane` is (R, words).
+
+    Bits beyond the face's edge may be set in the last word.
+    """
+    one, top = np.uint64(1), np.uint64(63)
+    for _ in range(rings):
+        wider = plane | plane << one | plane >> one
+        wider[:, 1:] |= plane[:, :-1] >> top
+        wider[:, :-1] |= plane[:, 1:] << top
+        plane = wider.copy()
+        plane[1:] |= wider[:-1]
+        plane[:-1] |= wider[1:]
     return plane

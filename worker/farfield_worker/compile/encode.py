@@ -1,8 +1,7 @@
-"""Atlas pages as files: PNG with the up filter and a fast deflate, or lossless WebP.
+"""Atlas pages as files: PNG through libdeflate, or lossless WebP.
 
-The PNG (ISO/IEC 15948) is put together here because no encoder at hand lets the filter be chosen:
-the up filter (section 9.2), the difference to the texel above, is one subtraction, and pages are
-laid out for it. The deflate stream is libdeflate's.
+The PNG (ISO/IEC 15948) is put together here, from its filters and a deflate stream of libdeflate:
+Pillow's own encoder takes five times as long for files no smaller.
 """
 
 from __future__ import annotations
@@ -16,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from farfield_worker.compile.filters import filtered
+
 #: libdeflate's effort, 1 to 12
 LEVEL = 6
 
-_UP = 2
 _RGBA = 6
 
 
@@ -31,11 +31,7 @@ def _chunk(kind: bytes, content: bytes | bytearray) -> bytes:
 def png(page: NDArray[np.uint8]) -> bytes:
     """Encode an image (height, width, 4) uint8, straight alpha, bit for bit."""
     height, width, _ = page.shape
-    flat = page.reshape(height, width * 4)
-    rows = np.empty((height, 1 + width * 4), np.uint8)
-    rows[:, 0] = _UP
-    rows[0, 1:] = flat[0]
-    np.subtract(flat[1:], flat[:-1], out=rows[1:, 1:])
+    rows = filtered(page.reshape(height, width * 4), 4)
     header = struct.pack(">IIBBBBB", width, height, 8, _RGBA, 0, 0, 0)
     return b"".join(
         (

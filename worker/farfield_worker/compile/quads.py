@@ -24,6 +24,11 @@ class Rectangles(NamedTuple):
     width: Ints
     height: Ints
 
+    @property
+    def turned(self) -> NDArray[np.bool_]:
+        """Those that are stored lying down, x and y swapped: all that are higher than wide."""
+        return self.height > self.width
+
     def take(self, order: NDArray[np.intp]) -> Rectangles:
         """Return the rectangles in another order."""
         return Rectangles(*(column[order] for column in self))
@@ -44,7 +49,9 @@ def layer_quads(boxes: Rectangles, places: Places, layers: Sequence[float]) -> Q
     corners = np.stack((left, top, right, top, right, bottom, left, bottom), axis=1)
     planes = np.zeros((n, 3))
     planes[:, 2] = (1 / np.asarray(layers))[boxes.layer]
-    offsets = np.stack((places.x - left, places.y - top), axis=1)
+    turned = boxes.turned
+    along, across = np.where(turned, top, left), np.where(turned, left, top)
+    offsets = np.stack((places.x - along, places.y - across), axis=1)
     return Quads(
         eyes=(0,) * n,
         faces=tuple(boxes.face.tolist()),
@@ -55,5 +62,5 @@ def layer_quads(boxes: Rectangles, places: Places, layers: Sequence[float]) -> Q
         pages=tuple(places.page.tolist()),
         scales=(1.0,) * n,
         offsets=tuple(offsets.ravel().tolist()),
-        turned=(0,) * n,
+        turned=tuple(turned.astype(int).tolist()),
     )

@@ -13,9 +13,6 @@ import numpy as np
 from farfield_core.scene import Block, PreparedScene
 from numpy.typing import NDArray
 
-#: ranges with fewer triangles than this between them become one
-GAP = 16
-
 
 class NearRanges(NamedTuple):
     """Triangles of one block.
@@ -35,29 +32,37 @@ class NearRanges(NamedTuple):
         return sum(self.ranges[2::3])
 
 
-def near_list(
+def near_triangles(
     scene: PreparedScene, eye: NDArray[np.float64], half_width: float
-) -> list[NearRanges]:
-    """Triangles that meet the cube of max norm `half_width` around `eye` (3,), scene coordinates.
-
-    Ranges may hold a few triangles more: gaps shorter than `GAP` are closed.
-    """
+) -> NDArray[np.int64]:
+    """Triangles that meet the cube of max norm `half_width` around `eye` (3,), ascending: (n,)."""
     centre = np.asarray(eye, np.float64) - scene.origin
-    out = []
+    found = [np.zeros(0, np.int64)]
     for index in touched_blocks(scene, centre, half_width).tolist():
         block = scene.info.blocks[index]
-        if _inside(block, centre, half_width):
-            ranges = [(n, 0, part.triangles) for n, part in enumerate(block.parts)]
-        else:
-            first = block.first_triangle
-            triangles = np.asarray(scene.triangles[first : first + block.triangles])
-            meets = cube_meets(scene.positions, triangles, centre, half_width)
-            ranges = []
-            for n, part in enumerate(block.parts):
-                start = part.first_triangle - first
-                ranges += [(n, *run) for run in runs(meets[start : start + part.triangles])]
-        if ranges:
-            out.append(NearRanges(index, tuple(number for run in ranges for number in run)))
+        rows = np.arange(block.first_triangle, block.first_triangle + block.triangles)
+        if not _inside(block, centre, half_width):
+            triangles = np.asarray(scene.triangles[rows[0] : rows[-1] + 1])
+            rows = rows[cube_meets(scene.positions, triangles, centre, half_width)]
+        found.append(rows)
+    return np.sort(np.concatenate(found))
+
+
+def near_list(scene: PreparedScene, triangles: NDArray[np.int64]) -> list[NearRanges]:
+    """Ranges that hold just `triangles` (n,), ascending."""
+    out = []
+    for index, block in enumerate(scene.info.blocks):
+        ends = (block.first_triangle, block.first_triangle + block.triangles)
+        start, end = np.searchsorted(triangles, ends)
+        if start == end:
+            continue
+        here = np.zeros(block.triangles, np.bool_)
+        here[triangles[start:end] - block.first_triangle] = True
+        ranges = []
+        for n, part in enumerate(block.parts):
+            first = part.first_triangle - block.first_triangle
+            ranges += [(n, *run) for run in runs(here[first : first + part.triangles])]
+        out.append(NearRanges(index, tuple(number for run in ranges for number in run)))
     return out
 
 
@@ -71,12 +76,12 @@ def touched_blocks(
     return np.flatnonzero(meets.all(axis=1))
 
 
-def runs(chosen: NDArray[np.bool_], gap: int = GAP) -> list[tuple[int, int]]:
-    """(first, count) of the runs of true entries, those less than `gap` apart joined."""
+def runs(chosen: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """(first, count) of the runs of true entries."""
     places = np.flatnonzero(chosen)
     if len(places) == 0:
         return []
-    breaks = np.flatnonzero(np.diff(places) > gap)
+    breaks = np.flatnonzero(np.diff(places) > 1)
     firsts = places[np.concatenate([[0], breaks + 1])]
     lasts = places[np.concatenate([breaks, [len(places) - 1]])]
     return [(int(a), int(b - a + 1)) for a, b in zip(firsts, lasts, strict=True)]

@@ -26,15 +26,22 @@ def main(argv: list[str]) -> int:
     parser.add_argument("--id", required=True)
     parser.add_argument("--name", required=True)
     parser.add_argument("--memory-mb", type=int, default=0, help="0: no limit")
+    parser.add_argument("--cpu-seconds", type=int, default=0, help="0: no limit")
+    parser.add_argument("--up", choices=("y", "z"), default="y", help="the model's upward axis")
+    parser.add_argument("--scale", type=float, default=1.0, help="metres in a unit of the model")
     parser.add_argument("--max-triangles", type=int, default=Limits.triangles)
     args = parser.parse_args(argv)
     if args.memory_mb > 0:
         # data, not address space: mapped files and drivers' reservations cost nothing
         size = args.memory_mb << 20
         resource.setrlimit(resource.RLIMIT_DATA, (size, size))
+    if args.cpu_seconds > 0:
+        resource.setrlimit(resource.RLIMIT_CPU, (args.cpu_seconds, args.cpu_seconds + 5))
     limits = Limits(triangles=args.max_triangles)
     try:
-        info = prepare(args.source, args.out, args.id, args.name, limits, _tell)
+        info = prepare(
+            args.source, args.out, args.id, args.name, limits, _tell, up=args.up, scale=args.scale
+        )
     except FarfieldError as error:
         print(json.dumps({"ok": False, "error": str(error)}))
         return error.exit_code

@@ -6,6 +6,7 @@ import shutil
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from farfield_core.scene import Batch, Block, Bounds, Part, SceneInfo, Triple, map_scene
@@ -17,6 +18,7 @@ from farfield_worker.prepare.batches import TextureFiles, sort_into_batches
 from farfield_worker.prepare.clean import clean
 from farfield_worker.prepare.expand import bounds, centroids
 from farfield_worker.prepare.limits import Limits, refuse
+from farfield_worker.prepare.orientation import guess_orientation, upright_matrix
 from farfield_worker.prepare.pictures import draw_pictures
 from farfield_worker.prepare.read import read_model
 from farfield_worker.prepare.split import split
@@ -38,8 +40,13 @@ def prepare(
     limits: Limits | None = None,
     progress: Progress = lambda line: None,
     pictures: bool = True,
+    up: Literal["y", "z"] = "y",
+    scale: float = 1.0,
 ) -> SceneInfo:
     """Prepare the model at `source` into the folder `out`, replacing what is there.
+
+    `up` is the axis of the model's own coordinates that points up, `scale` the metres in one of
+    their units.
 
     Nothing is visible under `out` before everything is. With `pictures` it draws the map and the
     thumbnail, which creates a GL context in this process. Raises SceneRefusedError for files that
@@ -50,7 +57,8 @@ def prepare(
     work = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
     try:
         work.chmod(0o755)
-        info = _prepare(source, work, scene_id, name, limits, progress, pictures)
+        upright = upright_matrix(up, scale)
+        info = _prepare(source, work, scene_id, name, limits, progress, pictures, upright)
         if out.exists():
             shutil.rmtree(out)
         work.rename(out)
@@ -69,8 +77,9 @@ def _prepare(
     limits: Limits,
     progress: Progress,
     pictures: bool,
+    upright: NDArray[np.float64],
 ) -> SceneInfo:
-    info = _convert(source, work, scene_id, name, limits, progress)
+    info = _convert(source, work, scene_id, name, limits, progress, upright)
     if pictures:
         progress("drawing the map")
         view = draw_pictures(map_scene(work, info), work)
@@ -83,13 +92,20 @@ def _prepare(
 
 
 def _convert(
-    source: Path, work: Path, scene_id: str, name: str, limits: Limits, progress: Progress
+    source: Path,
+    work: Path,
+    scene_id: str,
+    name: str,
+    limits: Limits,
+    progress: Progress,
+    upright: NDArray[np.float64],
 ) -> SceneInfo:
     """Write everything but the pictures and scene.json."""
     progress("reading")
     model = read_model(source, limits)
     if not np.isfinite(model.matrices).all():
         refuse(source.name, "a transform is not a number")
+    model.matrices = upright @ model.matrices
     clean(model)
     (work / "textures").mkdir()
     files = TextureFiles(work / "textures", model.notes)
@@ -104,6 +120,8 @@ def _convert(
     low, high = bounds(assembly)
     if not (np.abs(low).max() < _FARTHEST and np.abs(high).max() < _FARTHEST):
         refuse(source.name, "its coordinates are too large")
+    said = not np.array_equal(upright, np.eye(4))
+    suspected = None if said else guess_orientation(assembly, low, high, source.suffix)
     origin = np.rint((low + high) / 2) + 0.0
     points = centroids(assembly, origin)
     order, starts = split(points)
@@ -120,6 +138,7 @@ def _convert(
         batches=tuple(batches),
         blocks=tuple(blocks),
         notes=tuple(model.notes),
+        suspected=suspected,
     )
 
 

@@ -114,9 +114,9 @@ class NearPolygons:
                 if texture is not None and texture not in self._textures:
                     self._textures[texture] = _upload(context, texture, read)
 
-    def draw(self, camera: dict[str, Any], eye: NDArray[np.float64], near_field: float) -> None:
-        """Draw what lies within `near_field` of the centre; `eye` is relative to the centre."""
-        self._programs.set(eye=tuple(eye), near_field=near_field, **camera)
+    def draw(self, camera: dict[str, Any], eye: NDArray[np.float64], half_width: float) -> None:
+        """Draw what lies within `half_width` of the centre; `eye` is relative to the centre."""
+        self._programs.set(eye=tuple(eye), near_field=half_width, **camera)
         for material, array in self._draws:
             set_uniforms(
                 self._programs.get(material.features),

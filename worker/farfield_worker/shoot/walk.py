@@ -67,7 +67,7 @@ class WalkShooter:
             eye = np.asarray(view.eye, np.float64) - self._centre
             uniforms = camera(view, NEAR_CLIP * min(self.walk.grid.size))
             self._canvas.begin(view)
-            self._near.draw(uniforms, eye, self.walk.near_field)
+            self._near.draw(uniforms, eye, self.walk.near_drawn)
             self._quads.draw(uniforms, eye)
             return self._canvas.end()
 

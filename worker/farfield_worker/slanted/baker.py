@@ -25,13 +25,17 @@ from farfield_worker.slanted.segment import SegmentSettings
 from farfield_worker.slanted.tolerance import DEFAULT_FACTOR, Tolerance
 from farfield_worker.visibility.clusters import Clusters
 from farfield_worker.visibility.depth_maps import DepthMapRenderer, MapCache
+from farfield_worker.visibility.far_texels import FarTexels
 from farfield_worker.visibility.from_region import cell_eyes, seen
+from farfield_worker.visibility.sampling import Watcher
 from farfield_worker.visibility.spread import spread
 
 Floats = NDArray[np.float64]
 
 #: times the block run in its context, under a name
 Watch = Callable[[str], AbstractContextManager[None]]
+#: shows what the cell's eyes see to the watchers given
+Look = Callable[[Sequence[Watcher]], None]
 
 _CORNERS = slice(1, 9)
 
@@ -87,8 +91,8 @@ class SlantedBaker:
         self.resolution = resolution
         clusters = Clusters(scene)
         self._abuffer = ABuffer(scene, clusters)
-        self._renderer = DepthMapRenderer(scene, resolution, clusters)
-        self.maps = MapCache(self._renderer, cache)
+        self.renderer = DepthMapRenderer(scene, resolution, clusters)
+        self.maps = MapCache(self.renderer, cache)
         self._painter = QuadPainter(resolution)
 
     def cell(
@@ -96,8 +100,13 @@ class SlantedBaker:
         centre: Sequence[float] | Floats,
         settings: SlantedSettings,
         watch: Watch | None = None,
+        look: Look | None = None,
     ) -> SlantedCell:
-        """Quads of the cell around `centre` (3,), scene coordinates; `watch` times the stages."""
+        """Quads of the cell around `centre` (3,), scene coordinates.
+
+        `watch` times the stages; `look`, if given, tells what the cell's eyes see instead of depth
+        maps of the whole scene.
+        """
         stage = watch or (lambda kind: nullcontext())
         c = np.asarray(centre, np.float64)
         cell = SlantedCell([], 0, 0)
@@ -109,7 +118,7 @@ class SlantedBaker:
         cell.fragments = sum(len(f.texel) for f in fragments.values())
         if settings.visibility:
             with stage("visibility"):
-                fragments = self._visible(c, fragments, settings)
+                fragments = self._visible(c, fragments, settings, look)
         cell.seen = sum(len(f.texel) for f in fragments.values())
         self._painter.clear()
         with stage("sheets"):
@@ -125,7 +134,7 @@ class SlantedBaker:
 
     def close(self) -> None:
         """Free what the GPU holds."""
-        for thing in (self._abuffer, self._renderer, self._painter):
+        for thing in (self._abuffer, self.renderer, self._painter):
             thing.close()
 
     def _tolerance(self, face: int, settings: SlantedSettings) -> Tolerance:
@@ -139,7 +148,11 @@ class SlantedBaker:
         )
 
     def _visible(
-        self, centre: Floats, fragments: dict[int, Fragments], settings: SlantedSettings
+        self,
+        centre: Floats,
+        fragments: dict[int, Fragments],
+        settings: SlantedSettings,
+        look: Look | None,
     ) -> dict[int, Fragments]:
         """Fragments that some eye of the cell can see, and what continues them."""
         points, slack = [], []
@@ -147,8 +160,14 @@ class SlantedBaker:
             points.append(centre + texel_points(face, here.texel, here.disparity, self.resolution))
             high = self._tolerance(face, settings).interval(here.disparity)[1]
             slack.append(high - here.disparity)
-        eyes = cell_eyes(centre, np.asarray(settings.half_extents))
-        known = seen(np.concatenate(points), np.concatenate(slack), eyes, self.maps)
+        if look is None:
+            eyes = cell_eyes(centre, np.asarray(settings.half_extents))
+            known = seen(np.concatenate(points), np.concatenate(slack), eyes, self.maps)
+        else:
+            disparity = np.concatenate([here.disparity for here in fragments.values()])
+            far = FarTexels(np.concatenate(points), np.concatenate(slack) / disparity)
+            look([far])
+            known = far.seen
         ends = np.cumsum([len(f.texel) for f in fragments.values()])
         visible = {}
         for (face, here), mask in zip(fragments.items(), np.split(known, ends[:-1]), strict=True):
@@ -168,6 +187,7 @@ class SlantedBaker:
         half = np.asarray(settings.half_extents, np.float64)
         return residual_quads(
             self.scene,
+            self.renderer,
             self.maps,
             self._painter,
             centre,

@@ -21,7 +21,8 @@ class Grid(NamedTuple):
     Attributes:
         starts: (resolution^2 + 1,) int32, first fragment of each texel.
         disparity, low, high: (n,) float, true disparity and the interval allowed, 1/m.
-        owner: (n,) int32, the sheet that has captured each, -1 if none yet.
+        owner: (n,) int32, the sheet that has captured each, -1 if none yet; `low` of captured ones
+            is infinite, so that nothing may draw them again.
         resolution: texels across the face.
     """
 
@@ -53,26 +54,31 @@ def drawable(resolution: int, x: int, y: int, a: float, b: float, c: float) -> b
     return value(resolution, x, y, a, b, c) >= least
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def match(grid: Any, x: int, y: int, a: float, b: float, c: float) -> int:
     """Fragment, not yet captured, at texel (x, y) that plane (a, b, c) may draw; -1 if none."""
-    cell = y * grid.resolution + x
+    resolution = grid.resolution
+    found = -1
+    cell = y * resolution + x
     first, end = grid.starts[cell], grid.starts[cell + 1]
-    if first == end or not drawable(grid.resolution, x, y, a, b, c):
-        return -1
-    d = value(grid.resolution, x, y, a, b, c)
-    for f in range(first, end):
-        if grid.owner[f] < 0 and grid.low[f] <= d <= grid.high[f]:
-            return int(f)
-    return -1
+    if first < end:
+        size = 2.0 / resolution
+        d = a * ((x + 0.5) * size - 1.0) + b * ((y + 0.5) * size - 1.0) + c
+        if d >= (abs(a) + abs(b)) * (1.0 + 2.0 * GROWTH) / resolution:
+            for f in range(first, end):
+                if grid.low[f] <= d <= grid.high[f]:
+                    found = f
+                    break
+    return found
 
 
 @njit(cache=True)
 def count_texels(grid: Any, plane: Any, x0: int, y0: int, x1: int, y1: int) -> int:
-    """Texels of a rectangle at which the plane may draw something."""
+    """Texels of a rectangle at which the plane may draw something; none lie outside the face."""
     total = 0
-    for y in range(y0, y1):
-        for x in range(x0, x1):
+    resolution = grid.resolution
+    for y in range(max(y0, 0), min(y1, resolution)):
+        for x in range(max(x0, 0), min(x1, resolution)):
             if match(grid, x, y, plane[0], plane[1], plane[2]) >= 0:
                 total += 1
     return total

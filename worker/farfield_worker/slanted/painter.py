@@ -46,14 +46,16 @@ _FRAGMENT = """#version 450 core
 in vec2 v_texel;
 flat in ivec3 v_sheet;
 layout(std430, binding = 0) readonly buffer Texels { uint texels[]; };
-layout(location = 0) out uvec2 shown;
+layout(location = 0) out float disparity;
+layout(location = 1) out uint shown;
 uniform float near;
 
 void main() {
   ivec2 texel = clamp(ivec2(floor(v_texel)), ivec2(0), v_sheet.yz - 1);
   uint color = texels[v_sheet.x + texel.y * v_sheet.y + texel.x];
   if (color == 0u) discard;
-  shown = uvec2(floatBitsToUint(gl_FragCoord.z / near), color);
+  disparity = gl_FragCoord.z / near;
+  shown = color;
 }
 """
 
@@ -110,9 +112,10 @@ class QuadPainter:
         self._array: moderngl.VertexArray | None = None
         with gl.current() as context:
             self._program = context.program(vertex_shader=_VERTEX, fragment_shader=_FRAGMENT)
-            self._shown = context.texture((resolution, resolution), 2, dtype="u4")
+            self._disparity = context.texture((resolution, resolution), 1, dtype="f4")
+            self._color = context.texture((resolution, resolution), 1, dtype="u4")
             self._depth = gl.float_depth(context, (resolution, resolution))
-            self._framebuffer = context.framebuffer([self._shown], self._depth)
+            self._framebuffer = context.framebuffer([self._disparity, self._color], self._depth)
 
     def clear(self) -> None:
         """Forget all quads."""
@@ -128,27 +131,32 @@ class QuadPainter:
         self._parts.append(part)
         self._forget()
 
-    def draw(self, face: int, eye: Floats) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
-        """Disparity and colour shown on `face` of `eye` (3,), relative to the cell's centre.
+    def draw(self, face: int, eye: Floats) -> NDArray[np.float32]:
+        """Disparity shown on `face` of `eye` (3,), relative to the cell's centre.
 
-        Both (resolution, resolution), row 0 on top; 0 where there is nothing.
+        (resolution, resolution), row 0 on top; 0 where there is nothing.
         """
-        size = (self.resolution, self.resolution)
         _, right, down, forward = FACES[face]
         with gl.current() as context:
             self._upload(context)
             self._framebuffer.use()
             context.enable_only(moderngl.DEPTH_TEST)
+            # this leaves integers undefined, so colours count only where there is a disparity
             self._framebuffer.clear(depth=0.0)
-            self._shown.write(bytes(8 * self.resolution * self.resolution))
             axes = {"eye": eye, "right": right, "down": down, "forward": forward}
             set_uniforms(self._program, near=_NEAR, **{k: tuple(v) for k, v in axes.items()})
             if self._array is not None:
                 self._texel_buffer.bind_to_storage_buffer(0)
                 self._array.render(moderngl.TRIANGLES)
-            data = np.frombuffer(self._shown.read(), np.uint32).reshape(*size, 2)
-        disparity, color = np.ascontiguousarray(data.transpose(2, 0, 1))
-        return disparity.view(np.float32), color
+            data = np.frombuffer(self._disparity.read(), np.float32)
+        return data.reshape(self.resolution, self.resolution)
+
+    def picture(self, face: int, eye: Floats) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+        """As `draw`, with the colours, RGBA8 packed."""
+        disparity = self.draw(face, eye)
+        with gl.current():
+            data = np.frombuffer(self._color.read(), np.uint32).reshape(disparity.shape)
+        return disparity, np.where(disparity > 0, data, np.uint32(0))
 
     def close(self) -> None:
         """Free what the GPU holds."""

@@ -22,13 +22,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from farfield_worker.slanted.fragments import Fragments
-from farfield_worker.slanted.near_border import inside, walls
+from farfield_worker.slanted.near_border import walls
 from farfield_worker.slanted.painter import QuadPainter
 from farfield_worker.slanted.planes import seeds
-from farfield_worker.slanted.quads import SlantedQuads, face_quads, texel_uv
+from farfield_worker.slanted.quads import SlantedQuads, face_quads
 from farfield_worker.slanted.segment import SegmentSettings
-from farfield_worker.slanted.tolerance import Tolerance
-from farfield_worker.visibility.depth_maps import DepthMap, MapSource
+from farfield_worker.slanted.tolerance import Tolerance, lowest
+from farfield_worker.visibility.depth_maps import DepthMap, DepthMapRenderer, MapSource
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -37,6 +37,8 @@ Mask = NDArray[np.bool_]
 CROWD = 3
 #: texels that a residual sheet needs
 LEAST = 4
+#: relative difference of disparity between two rasterisers' idea of one surface
+SAME = 1e-3
 
 
 class EyeQuads(NamedTuple):
@@ -55,9 +57,8 @@ def residual_texels(
     `shown` (h, w) is the disparity drawn, 0 where nothing is; `far` says where the truth shows the
     far field.
     """
-    low = np.where(truth.disparity > 0, tolerance.interval(truth.disparity)[0], 0.0)
     missing = np.zeros(shown.shape, np.bool_)
-    _find(truth.disparity, low, shown, far, missing)
+    _find(truth.disparity, tolerance.steps(), shown, far, missing)
     result = np.zeros(shown.shape, np.bool_)
     _crowd(missing, result)
     return result
@@ -65,6 +66,7 @@ def residual_texels(
 
 def residual_quads(
     scene: PreparedScene,
+    renderer: DepthMapRenderer,
     maps: MapSource,
     painter: QuadPainter,
     centre: Floats,
@@ -78,21 +80,23 @@ def residual_quads(
 ) -> list[EyeQuads]:
     """Quads that mend what `painter` leaves out as seen from `eyes` (k, 3), relative to `centre`.
 
-    `painter` holds the quads so far and gets the new ones.
+    `painter` holds the quads so far and gets the new ones; `maps` are those of `renderer`.
     """
     found = []
     for eye in eyes:
         new = []
         for face in faces:
             truth = maps.map(centre + eye, face)
+            far = far_texels(truth, face, eye, near)
+            if not far.any():
+                continue
             tolerance = Tolerance.of(face, eye, half_extents, alpha, near, factor)
             wall_planes = walls(face, eye, near)
-            far = far_texels(truth, face, eye, near)
-            shown, _ = painter.draw(face, eye)
+            shown = painter.draw(face, eye)
             missing = residual_texels(truth, shown, tolerance, far)
             if not missing.any():
                 continue
-            fragments = map_fragments(truth, missing)
+            fragments = residual_fragments(renderer, centre + eye, face, truth, missing)
             seed, planes = seeds(scene, centre + eye, face, fragments.triangle)
             quads = face_quads(
                 fragments,
@@ -114,38 +118,63 @@ def residual_quads(
 
 def far_texels(truth: DepthMap, face: int, eye: Floats, near: float) -> Mask:
     """Where a map of `face` of `eye` (3,), relative to the centre, shows the far field: (h, w)."""
-    resolution = len(truth.disparity)
-    every = np.arange(resolution * resolution, dtype=np.int32)
-    u, v = texel_uv(every, resolution)
-    within = inside(truth.disparity.reshape(-1), u, v, walls(face, eye, near))
-    return (truth.disparity > 0) & ~within.reshape(resolution, resolution)
+    far = np.zeros(truth.disparity.shape, np.bool_)
+    _outside(truth.disparity, walls(face, eye, near), far)
+    return far
 
 
-def map_fragments(truth: DepthMap, which: Mask) -> Fragments:
-    """Texels of a map where `which` (h, w), as fragments; those without a surface are left out."""
-    texel = np.flatnonzero(which & (truth.disparity > 0)).astype(np.int32)
+def residual_fragments(
+    renderer: DepthMapRenderer, eye: Floats, face: int, truth: DepthMap, missing: Mask
+) -> Fragments:
+    """Texels of a map of `face` of `eye` (3,), scene coordinates, that are `missing` (h, w).
+
+    Those at which GL's rasteriser has no surface as near as the map's are left out.
+    """
+    which = missing & (truth.disparity > 0)
+    picture = renderer.picture(eye, face, np.unique(truth.triangle[which]))
+    which &= picture.disparity >= (1.0 - SAME) * truth.disparity
+    texel = np.flatnonzero(which).astype(np.int32)
     return Fragments(
         texel,
-        truth.disparity.reshape(-1)[texel],
-        truth.color.reshape(-1)[texel],
-        truth.triangle.reshape(-1)[texel],
+        picture.disparity.reshape(-1)[texel],
+        picture.color.reshape(-1)[texel],
+        picture.triangle.reshape(-1)[texel],
     )
 
 
 @njit(cache=True)
-def _find(true: Any, low: Any, shown: Any, far: Any, missing: Any) -> None:
+def _outside(disparity: Any, wall_planes: Any, far: Any) -> None:
+    """Mark texels whose surface lies outside the near cube, see near_border.py."""
+    size = 2.0 / len(disparity)
+    for y in range(len(disparity)):
+        v = (y + 0.5) * size - 1.0
+        for x in range(len(disparity)):
+            d = disparity[y, x]
+            if d == 0.0:
+                continue
+            u = (x + 0.5) * size - 1.0
+            for k in range(len(wall_planes)):
+                if d <= wall_planes[k, 0] * u + wall_planes[k, 1] * v + wall_planes[k, 2]:
+                    far[y, x] = True
+                    break
+
+
+@njit(cache=True)
+def _find(true: Any, steps: Any, shown: Any, far: Any, missing: Any) -> None:
     """Mark far texels that show nothing amid geometry, or something beyond all that is true."""
     height, width = true.shape
     for y in range(height):
         for x in range(width):
-            if not far[y, x] or (shown[y, x] >= low[y, x] and shown[y, x] > 0):
+            if not far[y, x] or (shown[y, x] > 0 and shown[y, x] >= lowest(true[y, x], steps)):
                 continue
-            amid, lowest = True, np.inf
+            amid, least = True, np.inf
             for ny in range(max(y - 1, 0), min(y + 2, height)):
                 for nx in range(max(x - 1, 0), min(x + 2, width)):
-                    amid = amid and true[ny, nx] > 0
-                    lowest = min(lowest, low[ny, nx])
-            missing[y, x] = amid if shown[y, x] == 0 else shown[y, x] < lowest
+                    if true[ny, nx] > 0:
+                        least = min(least, lowest(true[ny, nx], steps))
+                    else:
+                        amid = False
+            missing[y, x] = amid and (shown[y, x] == 0 or shown[y, x] < least)
 
 
 @njit(cache=True)

@@ -128,34 +128,49 @@ def segment(
 
 
 @njit(cache=True)
+def _strip(grid: Any, plane: Any, rect: Any, side: int) -> int:
+    """Texels that the plane captures in the strip next to `side` of `rect`: left, top and so on."""
+    x0, y0, x1, y1 = rect[0], rect[1], rect[2], rect[3]
+    if side == 0:
+        return int(count_texels(grid, plane, x0 - 1, y0, x0, y1))
+    if side == 1:
+        return int(count_texels(grid, plane, x0, y0 - 1, x1, y0))
+    if side == 2:
+        return int(count_texels(grid, plane, x1, y0, x1 + 1, y1))
+    return int(count_texels(grid, plane, x0, y1, x1, y1 + 1))
+
+
+@njit(cache=True)
 def _grow(grid: Any, plane: Any, rect: Any, fill: float, strip: float, largest: int) -> int:
-    """Grow `rect` in place as far as it stays full; return the texels the plane captures."""
+    """Grow `rect` in place as far as it stays full; return the texels the plane captures.
+
+    What the strips next to all sides capture is kept up to date: when one side grows, the two
+    strips beside it get one texel longer.
+    """
     resolution = grid.resolution
     total = count_texels(grid, plane, rect[0], rect[1], rect[2], rect[3])
+    found = np.zeros(4, np.int64)
+    for side in range(4):
+        found[side] = _strip(grid, plane, rect, side)
     refused = 0
     side = 0
     while refused < 4:
-        x0, y0, x1, y1 = rect[0], rect[1], rect[2], rect[3]
-        if side == 0:
-            x1, x0 = x0, x0 - 1
-        elif side == 1:
-            y1, y0 = y0, y0 - 1
-        elif side == 2:
-            x0, x1 = x1, x1 + 1
-        else:
-            y0, y1 = y1, y1 + 1
+        across = side % 2  # 0: the strip is a column, 1: a row
+        length, breadth = rect[3 - across] - rect[1 - across], rect[2 + across] - rect[across]
+        room = rect[side] > 0 if side < 2 else rect[side] < resolution
         grown = False
-        fits = max(x1, rect[2]) - min(x0, rect[0]) <= largest
-        fits = fits and max(y1, rect[3]) - min(y0, rect[1]) <= largest
-        if fits and x0 >= 0 and y0 >= 0 and x1 <= resolution and y1 <= resolution:
-            found = count_texels(grid, plane, x0, y0, x1, y1)
-            area = (x1 - x0) * (y1 - y0)
-            whole = (rect[2] - rect[0]) * (rect[3] - rect[1]) + area
-            if found >= strip * area and found > 0 and total + found >= fill * whole:
-                rect[0], rect[1] = min(rect[0], x0), min(rect[1], y0)
-                rect[2], rect[3] = max(rect[2], x1), max(rect[3], y1)
-                total += found
-                grown = True
+        if room and breadth < largest and found[side] > 0 and found[side] >= strip * length:
+            grown = total + found[side] >= fill * (breadth + 1) * length
+        if grown:
+            total += found[side]
+            # the texels that the strips beside this one gain
+            along = rect[side] - 1 if side < 2 else rect[side]
+            for other in (1 - across, 3 - across):
+                beside = rect[other] - 1 if other < 2 else rect[other]
+                x, y = (along, beside) if across == 0 else (beside, along)
+                found[other] += count_texels(grid, plane, x, y, x + 1, y + 1)
+            rect[side] += -1 if side < 2 else 1
+            found[side] = _strip(grid, plane, rect, side)
         refused = 0 if grown else refused + 1
         side = (side + 1) % 4
     return total
@@ -183,6 +198,7 @@ def _capture(grid: Any, plane: Any, rect: Any, sheet: int) -> None:
             f = match(grid, x, y, plane[0], plane[1], plane[2])
             while f >= 0:
                 grid.owner[f] = sheet
+                grid.low[f] = np.inf
                 f = match(grid, x, y, plane[0], plane[1], plane[2])
 
 
@@ -241,7 +257,7 @@ def _candidates(grid: Any, seed: Any, planes: Any, fragments: Any, tally: Any, o
     return count
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _fits(grid: Any, plane: Any, f: int, u: float, v: float) -> bool:
     """Whether `plane` may draw fragment f, seen at (u, v)."""
     d = plane[0] * u + plane[1] * v + plane[2]
@@ -256,6 +272,8 @@ def _best(grid: Any, candidates: Any, fragments: Any, places: Any, out: Any) -> 
     for k in range(len(candidates)):
         score = 0
         for i in range(len(fragments)):
+            if score + len(fragments) - i <= most:
+                break
             if _fits(grid, candidates[k], fragments[i], places[i, 0], places[i, 1]):
                 score += 1
         if score > most:

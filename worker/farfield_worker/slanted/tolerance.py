@@ -35,16 +35,30 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from farfield_core.errors import BadInputError
 from farfield_core.faces import FACES
+from numba import njit
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
 #: share of the bound that sheets use: it brings the mean error down to that of 64 layers
 DEFAULT_FACTOR = 0.68
+
+
+class Steps(NamedTuple):
+    """The constants of an interval: reaches of the cell, steps per (1 -+ reach d), and a ratio."""
+
+    ahead: float
+    behind: float
+    up_ahead: float
+    down_ahead: float
+    up_behind: float
+    down_behind: float
+    ratio: float
 
 
 @dataclass(frozen=True)
@@ -115,16 +129,45 @@ class Tolerance:
         never drawn behind (slanted/segment.py). The lower end may be negative: infinitely far.
         """
         d = np.asarray(disparity, np.float64)
-        forward = np.maximum(1.0 - self.ahead * d, 0.0)
-        backward = 1.0 + self.behind * d
-        up_ahead = forward * -_relative(-times * self.ln_ahead, self.ahead)
-        down_ahead = forward * _relative(times * self.ln_ahead, self.ahead)
-        up_behind = backward * _relative(times * self.ln_behind, self.behind)
-        down_behind = backward * -_relative(-times * self.ln_behind, self.behind)
-        high = d + np.minimum(up_ahead, up_behind)
-        low = d - np.minimum(down_ahead, down_behind)
-        ratio = math.exp(times * self.ln_ratio)
-        return np.minimum(low, d / ratio), np.maximum(high, d * ratio)
+        low, high = np.empty(d.shape), np.empty(d.shape)
+        _intervals(d.reshape(-1), self.steps(times), low.reshape(-1), high.reshape(-1))
+        return low, high
+
+    def steps(self, times: float = 1.0) -> Steps:
+        """What `lowest` and `highest` need, for `times` the tolerance."""
+        return Steps(
+            self.ahead,
+            self.behind,
+            -_relative(-times * self.ln_ahead, self.ahead),
+            _relative(times * self.ln_ahead, self.ahead),
+            _relative(times * self.ln_behind, self.behind),
+            -_relative(-times * self.ln_behind, self.behind),
+            math.exp(times * self.ln_ratio),
+        )
+
+
+@njit(cache=True)
+def lowest(d: float, steps: Any) -> float:
+    """Lowest disparity at which a surface at disparity `d` may be drawn."""
+    forward = max(1.0 - steps.ahead * d, 0.0)
+    backward = 1.0 + steps.behind * d
+    down = min(forward * steps.down_ahead, backward * steps.down_behind)
+    return float(min(d - down, d / steps.ratio))
+
+
+@njit(cache=True)
+def highest(d: float, steps: Any) -> float:
+    """Highest disparity at which a surface at disparity `d` may be drawn."""
+    forward = max(1.0 - steps.ahead * d, 0.0)
+    backward = 1.0 + steps.behind * d
+    up = min(forward * steps.up_ahead, backward * steps.up_behind)
+    return float(max(d + up, d * steps.ratio))
+
+
+@njit(cache=True)
+def _intervals(d: Any, steps: Any, low: Any, high: Any) -> None:
+    for i in range(len(d)):
+        low[i], high[i] = lowest(d[i], steps), highest(d[i], steps)
 
 
 def _ln_k(reach: float, across: float, alpha: float) -> float:

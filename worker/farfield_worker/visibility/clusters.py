@@ -2,14 +2,13 @@
 
 Runs of 128 triangles, neighbours along the prepared scene's space-filling curve, have bounds of
 their own. A cluster is dropped where its bounds lie outside the face, or behind what has been drawn
-already: where the greatest disparity of the bounds is below the least drawn in the rectangle of
-texels they cover, read from a pyramid of minima (Greene, Kass, Miller 1993). Of the rest, triangles
-are dropped that lie outside the face, face away, or slip between texel centres. All tests are
-conservative: what is dropped draws nothing.
+already (visibility/raster.py). Of the rest, triangles are dropped that lie outside the face, face
+away, or slip between texel centres. All tests are conservative: what is dropped draws nothing.
 """
 
 from __future__ import annotations
 
+import copy
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +16,8 @@ from farfield_core.faces import FACES
 from farfield_core.scene import PreparedScene
 from numba import njit
 from numpy.typing import NDArray
+
+from farfield_worker.visibility.raster import Tiles, draw_clusters, hidden
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -47,6 +48,20 @@ class InView(NamedTuple):
         return InView(
             self.cluster[which], self.triangles[which], self.rect[which], self.disparity[which]
         )
+
+
+class ByBatch(NamedTuple):
+    """Triangles, those of one batch after another.
+
+    Attributes:
+        vertices: (n, 3) uint32, indices of their corners.
+        triangles: (n,) int32, their indices in the scene.
+        starts: (batches + 1,) int32, where each batch's run starts.
+    """
+
+    vertices: NDArray[np.uint32]
+    triangles: Ints
+    starts: Ints
 
 
 class Clusters:
@@ -80,27 +95,53 @@ class Clusters:
         triangles = self.runs[order, 2].astype(np.int32)
         return InView(order, triangles, rect[order], disparity[order])
 
-    def not_hidden(self, clusters: InView, drawn: NDArray[np.float32]) -> InView:
-        """Those of `clusters` that `drawn` (h, w), disparities so far, 0 if none, may not hide."""
-        pyramid = [drawn]
-        while min(pyramid[-1].shape) > 1:
-            pyramid.append(_halve(pyramid[-1]))
-        keep = np.ones(len(clusters.cluster), np.bool_)
-        size = (clusters.rect[:, 2:] - clusters.rect[:, :2]).max(axis=1, initial=1)
-        level = np.minimum(np.ceil(np.log2(np.maximum(size, 1))).astype(np.int32), len(pyramid) - 1)
-        for k, minima in enumerate(pyramid):
-            here = np.flatnonzero(level == k)
-            _test(minima, k, clusters.rect[here], clusters.disparity[here], here, keep)
-        return clusters.take(keep)
+    def meeting(self, centre: Floats, half_width: float) -> Clusters:
+        """Those whose bounds meet the cube around `centre` (3,), relative to the scene's origin."""
+        low, high = self._bounds[:, 0], self._bounds[:, 1]
+        meets = ((low <= centre + half_width) & (high >= centre - half_width)).all(axis=1)
+        some = copy.copy(self)
+        some.runs, some._bounds = self.runs[meets], self._bounds[meets]
+        return some
+
+    def draw(self, clusters: InView, eye: Floats, face: int, nearest: float, tiles: Tiles) -> None:
+        """Draw all triangles of `clusters` beyond Z = `nearest` into `tiles`, as if opaque."""
+        draw_clusters(
+            self._positions,
+            self._indices,
+            self.runs[clusters.cluster],
+            clusters.rect,
+            clusters.disparity,
+            ~self._double_sided,
+            np.asarray(eye, np.float64) - self._origin,
+            _axes(face),
+            nearest,
+            tiles.disparity,
+            tiles.triangle,
+            tiles.floor,
+            tiles.stale,
+        )
+
+    def not_hidden(self, clusters: InView, tiles: Tiles) -> InView:
+        """Those of `clusters` that what is drawn in `tiles` may not hide."""
+        keep = [
+            not hidden(rect, nearest, tiles.disparity, tiles.floor, tiles.stale)
+            for rect, nearest in zip(clusters.rect, clusters.disparity, strict=True)
+        ]
+        return clusters.take(np.array(keep, np.bool_))
+
+    def by_batch(self, triangles: Ints) -> ByBatch:
+        """Group `triangles` (n,), the scene's indices, by batch."""
+        order = np.argsort(self.runs[:, 1])
+        run = order[np.searchsorted(self.runs[order, 1], triangles, side="right") - 1]
+        batch = self.runs[run, 0]
+        ids = triangles[np.argsort(batch, kind="stable")].astype(np.int32)
+        starts = np.searchsorted(np.sort(batch), np.arange(self._batches + 1)).astype(np.int32)
+        return ByBatch(self._indices[ids], ids, starts)
 
     def triangles(
         self, clusters: InView, eye: Floats, face: int, nearest: float, resolution: int
-    ) -> tuple[NDArray[np.uint32], Ints, Ints]:
-        """Triangles of `clusters` that may draw something, by batch.
-
-        Returns their vertices (n, 3) uint32, their indices in the scene (n,) int32, and where each
-        batch's run starts, (batches + 1,) int32.
-        """
+    ) -> ByBatch:
+        """Triangles of `clusters` that may draw something."""
         total = int(clusters.triangles.sum())
         kept = np.empty(total, np.int32)
         batch = self.runs[clusters.cluster, 0]
@@ -119,20 +160,12 @@ class Clusters:
             starts,
         )
         kept = kept[:count].copy()
-        return self._indices[kept], kept, starts
+        return ByBatch(self._indices[kept], kept, starts)
 
 
 def _axes(face: int) -> Floats:
     _, right, down, forward = FACES[face]
     return np.stack([right, down, forward])
-
-
-def _halve(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Minima of 2 x 2 values; odd edges are continued."""
-    h, w = values.shape
-    even = np.pad(values, ((0, h % 2), (0, w % 2)), mode="edge")
-    rows = np.minimum(even[::2], even[1::2])
-    return np.minimum(rows[:, ::2], rows[:, 1::2])
 
 
 @njit(cache=True)
@@ -184,18 +217,6 @@ def _project(
         rect[r, 2] = int(min(max((u1 + 1.0) * half + 2.0, 1.0), resolution))
         rect[r, 3] = int(min(max((v1 + 1.0) * half + 2.0, 1.0), resolution))
         disparity[r] = 1.0 / max(near, nearest)
-
-
-@njit(cache=True)
-def _test(minima: Any, level: int, rect: Any, disparity: Any, where: Any, keep: Any) -> None:
-    """Clear `keep` for clusters behind everything drawn in their rectangles."""
-    for i in range(len(rect)):
-        least = np.inf
-        for y in range(rect[i, 1] >> level, ((rect[i, 3] - 1) >> level) + 1):
-            for x in range(rect[i, 0] >> level, ((rect[i, 2] - 1) >> level) + 1):
-                least = min(least, minima[y, x])
-        if least > disparity[i]:
-            keep[where[i]] = False
 
 
 @njit(cache=True)

@@ -61,16 +61,8 @@ def seen(
         counts = np.zeros(6, np.int64)
         _project(points, result, eye, _AXES, resolution, face, texel, disparity, counts)
         for k in np.flatnonzero(counts).tolist():
-            nearest = farthest_around(maps.map(eye, k).disparity).reshape(-1)
-            _test(face, k, texel, disparity, slack, nearest, result)
+            _test(face, k, texel, disparity, slack, maps.map(eye, k).disparity, result)
     return result
-
-
-def farthest_around(disparity: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Least disparity in the 3 x 3 texels around each of a map (h, w): (h, w) float32."""
-    grown = np.pad(disparity, 1, mode="edge")
-    rows = np.minimum(np.minimum(grown[:-2], grown[1:-1]), grown[2:])
-    return np.minimum(np.minimum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:])
 
 
 def triangles_seen(eyes: Floats, maps: MapSource, triangles: int) -> NDArray[np.bool_]:
@@ -123,7 +115,21 @@ def _project(
 def _test(
     face: Any, k: int, texel: Any, disparity: Any, slack: Any, nearest: Any, known: Any
 ) -> None:
-    """Mark the points on face k before which nothing lies."""
+    """Mark the points on face k before which nothing lies in one of nine texels."""
+    width = nearest.shape[1]
     for i in range(len(texel)):
-        if face[i] == k and nearest[texel[i]] <= disparity[i] + slack[i]:
-            known[i] = True
+        if face[i] == k:
+            known[i] = _reached(
+                nearest, texel[i] // width, texel[i] % width, disparity[i] + slack[i]
+            )
+
+
+@njit(cache=True)
+def _reached(nearest: Any, row: int, column: int, disparity: float) -> bool:
+    """Whether in the 3 x 3 texels around something is no nearer than `disparity`."""
+    height, width = nearest.shape
+    for y in range(max(row - 1, 0), min(row + 2, height)):
+        for x in range(max(column - 1, 0), min(column + 2, width)):
+            if nearest[y, x] <= disparity:
+                return True
+    return False

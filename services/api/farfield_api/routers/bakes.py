@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Depends, Query, Request
 
 from farfield_api.bakes import Progress
-from farfield_api.dependencies import Service
+from farfield_api.dependencies import Service, known_scene_in_body
 from farfield_api.exceptions import problems
+from farfield_api.listing import Cursor, Limit, page
 from farfield_api.names import BakeId
 from farfield_api.schemas import (
     BakeBody,
@@ -16,6 +19,7 @@ from farfield_api.schemas import (
     FailedCell,
     Focus,
     NewBake,
+    State,
 )
 
 router = APIRouter(prefix="/bakes", tags=["bakes"])
@@ -39,18 +43,43 @@ def describe(progress: Progress) -> BakeBody:
     )
 
 
-@router.post("", status_code=201, responses=problems(404, 409, 422))
-def add_bake(service: Service, request: BakeRequest) -> NewBake:
+@router.post(
+    "",
+    status_code=201,
+    responses=problems(403, 404, 409, 422),
+    dependencies=[Depends(known_scene_in_body)],
+)
+def add_bake(http: Request, service: Service, request: BakeRequest) -> NewBake:
     """Ask for a bake. The same scene, corridor and settings are the same bake."""
     corridor = service.corridor(request.scene, request.corridor)
-    return NewBake(id=service.create_bake(request.scene, corridor, request.settings))
+    bake = service.create_bake(request.scene, corridor, request.settings)
+    http.app.state.tracing.asked(bake)
+    return NewBake(id=bake)
 
 
-@router.get("")
-def bakes(service: Service) -> BakeList:
-    """List all bakes, in the order in which they were asked for."""
+@router.get("", responses=problems(422))
+def bakes(
+    service: Service,
+    limit: Limit = 100,
+    cursor: Cursor = None,
+    order: Literal["oldest", "newest"] = "oldest",
+    state: State | None = None,
+    scene: Annotated[str | None, Query(pattern=r"^[a-z0-9-]{1,64}$")] = None,
+) -> BakeList:
+    """List bakes, in the order in which they were asked for."""
     known = service.bakes
-    return BakeList(bakes=[describe(known.progress(bake)) for bake in known.ids()])
+
+    def find(key: str) -> BakeBody | None:
+        bake = key.rpartition(" ")[2]
+        if scene is not None and known.walk(bake).scene.id != scene:
+            return None
+        body = describe(known.progress(bake))
+        return body if state in (None, body.state) else None
+
+    keys = known.order()
+    newest = order == "newest"
+    found, following = page(keys[::-1] if newest else keys, cursor, limit, find, falling=newest)
+    return BakeList(bakes=found, next=following)
 
 
 @router.get("/{bake}", responses=problems(404, 422))

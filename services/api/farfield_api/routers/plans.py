@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from farfield_core.plan import Plan, plan
-from fastapi import APIRouter
+from fastapi import APIRouter, Depends
 
-from farfield_api.dependencies import Service
+from farfield_api.dependencies import Service, known_scene_in_body
 from farfield_api.exceptions import problems
 from farfield_api.schemas import BakeRequest
 
 router = APIRouter(tags=["plans"])
 
 
-@router.post("/plans", responses=problems(404, 409, 422))
+@router.post(
+    "/plans", responses=problems(404, 409, 422), dependencies=[Depends(known_scene_in_body)]
+)
 def make_plan(service: Service, request: BakeRequest) -> Plan:
     """Estimate cells, near field, megabytes and seconds; nothing is rendered or kept."""
     scene = service.ready_scene(request.scene)

@@ -10,12 +10,14 @@ from farfield_core.cells import parse_cell_name
 from farfield_core.errors import NotFoundError
 from farfield_core.walk import Places
 from fastapi import APIRouter, Query, Request
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
 from farfield_api import immutable
 from farfield_api.dependencies import Service
 from farfield_api.exceptions import problems
 from farfield_api.names import BakeId, BlobName, CellName, PageNumber
+from farfield_api.packed import Coding, choose
 from farfield_api.schemas import CellNames
 
 router = APIRouter(prefix="/walks/{bake}", tags=["walks"], responses=problems(404, 422))
@@ -38,21 +40,36 @@ def manifest(request: Request, service: Service, bake: BakeId) -> Response:
 @router.get("/pages/{page}.json", response_class=Response)
 def cell_table(request: Request, service: Service, bake: BakeId, page: PageNumber) -> Response:
     """Get a slice of a large corridor's cell table."""
-    data = service.store.get(f"{layout.bake_prefix(bake)}pages/{page}.json")
-    return immutable.content(request, data, _JSON)
+    return _json(request, service, f"{layout.bake_prefix(bake)}pages/{page}.json")
 
 
 @router.head("/cells/{cell}.json", include_in_schema=False)
 @router.get("/cells/{cell}.json", response_class=Response)
-def cell(request: Request, service: Service, bake: BakeId, cell: CellName) -> Response:
+async def cell(request: Request, service: Service, bake: BakeId, cell: CellName) -> Response:
     """Get a cell; 404 while it is not baked, which also moves it to the front."""
     index = parse_cell_name(cell)
+    key, coding = layout.cell_key(bake, index), _coding(request)
+    data = service.packed.recent(key, coding)
+    if data is None:
+        data = await run_in_threadpool(_find, service, bake, cell, key, coding)
+    return immutable.packed(request, key, data, coding)
+
+
+def _coding(request: Request) -> Coding:
+    return choose(request.headers.get("accept-encoding", ""))
+
+
+def _json(request: Request, service: Service, key: str) -> Response:
+    coding = _coding(request)
+    return immutable.packed(request, key, service.packed.get(key, coding), coding)
+
+
+def _find(service: Service, bake: str, cell: str, key: str, coding: Coding) -> bytes:
     try:
-        data = service.store.get(layout.cell_key(bake, index))
+        return service.packed.get(key, coding)
     except NotFoundError:
-        service.bakes.hint(bake, index)
+        service.bakes.hint(bake, parse_cell_name(cell))
         raise NotFoundError(f"Cell {cell} of walk {bake} is not baked; ask again later.") from None
-    return immutable.content(request, data, _JSON)
 
 
 @router.get("/cells")

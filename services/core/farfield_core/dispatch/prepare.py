@@ -14,8 +14,10 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
@@ -24,7 +26,25 @@ from farfield_core.errors import FarfieldError, NotFoundError, SceneRefusedError
 from farfield_core.scene import SceneInfo
 from farfield_core.store import Store
 
+#: bytes of the child's output that are looked at
+_LAST_WORDS = 1 << 16
+
 COMMAND: tuple[str, ...] = (sys.executable, "-m", "farfield_worker", "prepare")
+
+
+@dataclass(frozen=True)
+class PrepareLimits:
+    """What preparing one scene may cost; 0: no limit.
+
+    Attributes:
+        memory_mb: memory of the process, 2**20 bytes.
+        cpu_seconds: processor time of the process and its threads.
+        wall_seconds: time by the clock.
+    """
+
+    memory_mb: int = 0
+    cpu_seconds: int = 0
+    wall_seconds: int = 0
 
 
 def prepare_scene(
@@ -32,6 +52,7 @@ def prepare_scene(
     scene: str,
     command: Sequence[str] = COMMAND,
     stopped: Callable[[], bool] = lambda: False,
+    limits: PrepareLimits | None = None,
 ) -> SceneInfo:
     """Prepare an uploaded scene unless it is ready already.
 
@@ -48,8 +69,14 @@ def prepare_scene(
         model = scenes.source_model(store, scene, Path(work) / "copy")
         out = Path(work) / "prepared"
         arguments = ["--source", model, "--out", out, "--id", scene, "--name", name]
+        limits = limits or PrepareLimits()
+        if limits.memory_mb:
+            arguments += ["--memory-mb", str(limits.memory_mb)]
+        if limits.cpu_seconds:
+            arguments += ["--cpu-seconds", str(limits.cpu_seconds)]
+        arguments += scenes.orientation(store, scene).arguments()
         try:
-            _run([*command, *map(str, arguments)], stopped)
+            _run([*command, *map(str, arguments)], stopped, limits)
         except SceneRefusedError as error:
             scenes.refuse(store, scene, str(error))
             raise
@@ -57,8 +84,9 @@ def prepare_scene(
     return scenes.scene_info(store, scene)
 
 
-def _run(command: list[str], stopped: Callable[[], bool]) -> None:
+def _run(command: list[str], stopped: Callable[[], bool], limits: PrepareLimits) -> None:
     """Run the child to its end; raises SceneRefusedError with what it says or died of."""
+    begun = time.monotonic()
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as words:
         try:
             child = subprocess.Popen(
@@ -74,6 +102,11 @@ def _run(command: list[str], stopped: Callable[[], bool]) -> None:
                 except subprocess.TimeoutExpired:
                     if stopped():
                         raise FarfieldError("Preparing the scene was stopped.") from None
+                    if 0 < limits.wall_seconds < time.monotonic() - begun:
+                        raise SceneRefusedError(
+                            f"Preparing the model took more than {limits.wall_seconds} s, which "
+                            "is all it may; make it smaller."
+                        ) from None
         finally:
             with suppress(ProcessLookupError):
                 os.killpg(child.pid, signal.SIGKILL)
@@ -83,6 +116,11 @@ def _run(command: list[str], stopped: Callable[[], bool]) -> None:
         said = json.loads(answer)
         good, reason = said.get("ok") is True, str(said.get("error", "no reason was given"))
     except (ValueError, AttributeError):
+        if code == -signal.SIGXCPU:
+            raise SceneRefusedError(
+                f"Preparing the model took more than {limits.cpu_seconds} s of processor time, "
+                "which is all it may; make it smaller."
+            ) from None
         ending = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
         good, reason = (
             False,
@@ -93,15 +131,21 @@ def _run(command: list[str], stopped: Callable[[], bool]) -> None:
 
 
 def _last_line(file: IO[bytes]) -> str:
-    file.seek(0)
+    file.seek(max(0, file.seek(0, os.SEEK_END) - _LAST_WORDS))
     return file.read().decode("utf-8", "replace").strip().rsplit("\n", 1)[-1]
 
 
 class ScenePreparer:
     """Prepares scenes one after the other in the background; safe to call from any thread."""
 
-    def __init__(self, store: Store, command: Sequence[str] = COMMAND) -> None:
+    def __init__(
+        self,
+        store: Store,
+        command: Sequence[str] = COMMAND,
+        limits: PrepareLimits | None = None,
+    ) -> None:
         self._store = store
+        self._limits = limits
         self._command = tuple(command)
         self._waiting: list[str] = []
         self._changed = threading.Condition()
@@ -148,7 +192,7 @@ class ScenePreparer:
                     return
                 scene = self._waiting[0]
             try:
-                prepare_scene(self._store, scene, self._command, lambda: self._closed)
+                prepare_scene(self._store, scene, self._command, lambda: self._closed, self._limits)
             except SceneRefusedError:
                 pass  # the store remembers why
             except (FarfieldError, OSError) as error:

@@ -3,6 +3,7 @@
 export interface Bake {
   readonly id: string;
   readonly name: string;
+  readonly scene: string;
   readonly progress: string;
 }
 
@@ -16,12 +17,14 @@ export function readBakes(answer: unknown): Bake[] {
     const id = member(entry, 'id');
     if (typeof id !== 'string') return [];
     const name = member(entry, 'name');
+    const scene = member(entry, 'scene');
     const cells = member(entry, 'cells');
     const [done, total] = [member(cells, 'done'), member(cells, 'total')];
     return [
       {
         id,
         name: typeof name === 'string' && name !== '' ? name : id,
+        scene: typeof scene === 'string' ? scene : '',
         progress:
           typeof done === 'number' && typeof total === 'number'
             ? done < total

@@ -37,3 +37,15 @@ export function formatPose({ eye, yaw, pitch }: Pose): string {
 export function isCapture(page: URL): boolean {
   return page.searchParams.has('capture');
 }
+
+/** `?memory=M`: megabytes of texture memory; undefined unless it is a number that can be meant. */
+export function textureMemory(page: URL): number | undefined {
+  const asked = Number(page.searchParams.get('memory') ?? NaN);
+  return asked >= 1 && asked <= 16_384 ? asked : undefined;
+}
+
+/** `?path=URL`: a recorded path to play. */
+export function pathUrl(page: URL): string | undefined {
+  const asked = page.searchParams.get('path');
+  return asked === null || asked === '' ? undefined : new URL(asked, page).href;
+}

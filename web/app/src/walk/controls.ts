@@ -1,5 +1,6 @@
-/** Keyboard, mouse and touch, gathered into one intent. */
+/** Keyboard, mouse, touch and gamepad, gathered into one intent. */
 
+import { readPads } from './gamepad.js';
 import type { Intent } from './walker.js';
 
 const KEYS: Readonly<Record<string, readonly ['right' | 'forward' | 'up', number] | undefined>> = {
@@ -22,6 +23,8 @@ const LOOK = 0.0026;
 const TOUCH_LOOK = 0.006;
 /** Radians a second while an arrow key is held. */
 const TURN_SPEED = 1.6;
+/** The same for a gamepad's stick. */
+const PAD_SPEED = 2.4;
 /** Pixels from the thumb's first place to full speed. */
 const STICK = 56;
 
@@ -46,6 +49,7 @@ export class Controls {
   private pitch = 0;
   private drag: { id: number; x: number; y: number; travelled: number } | undefined;
   private thumb: number | undefined;
+  private padFly = false;
 
   constructor(canvas: HTMLCanvasElement) {
     this.canvas = canvas;
@@ -79,13 +83,18 @@ export class Controls {
       axes.right += clamp(this.stick.dx / STICK);
       axes.forward -= clamp(this.stick.dy / STICK);
     }
+    const pad = readPads(navigator.getGamepads());
+    if (pad !== undefined) {
+      if (pad.fly && !this.padFly) this.onKey('KeyG');
+      this.padFly = pad.fly;
+    }
     const intent: Intent = {
-      right: clamp(axes.right),
-      forward: clamp(axes.forward),
-      up: clamp(axes.up),
-      yaw: this.yaw + turn * TURN_SPEED * seconds,
-      pitch: this.pitch,
-      fast: this.shift,
+      right: clamp(axes.right + (pad?.right ?? 0)),
+      forward: clamp(axes.forward + (pad?.forward ?? 0)),
+      up: clamp(axes.up + (pad?.up ?? 0)),
+      yaw: this.yaw + (turn * TURN_SPEED + (pad?.yaw ?? 0) * PAD_SPEED) * seconds,
+      pitch: this.pitch + (pad?.pitch ?? 0) * PAD_SPEED * seconds,
+      fast: this.shift || pad?.fast === true,
     };
     this.yaw = 0;
     this.pitch = 0;

@@ -8,9 +8,12 @@ const KEYS: readonly (readonly [readonly string[], string])[] = [
   [['←', '→'], 'turn'],
   [['Shift'], 'faster'],
   [['E', 'Q'], 'up, down; R and F too'],
-  [['G'], 'fly where you look'],
-  [['Wheel'], 'pace'],
-  [['P'], 'figures'],
+  [['G'], 'fly where you look, or land'],
+  [['+', '−'], 'pace; the wheel too'],
+  [['P'], 'figures, map, overlays'],
+  [['X'], 'freeze the cell'],
+  [['B'], 'compare with the full model'],
+  [['K', 'O'], 'record a path, save a picture'],
   [['H'], 'this help'],
 ];
 
@@ -41,7 +44,7 @@ export function Help({ close, flying }: { close: () => void; flying: boolean }):
         </dl>
         <p>
           Click the picture to look with the mouse, <kbd>Esc</kbd> to let go, or drag. On a touch
-          screen the left thumb walks and the right thumb looks.
+          screen the left thumb walks and the right thumb looks. Gamepads work too.
         </p>
         <p class="fine">
           {flying ? 'You are flying. ' : ''}The address of the page always leads back to where you

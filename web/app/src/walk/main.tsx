@@ -1,9 +1,11 @@
 /** The walk page. */
 
+import { FarfieldError, asError } from '@farfield/core';
 import { render } from 'preact';
 import '../styles.css';
-import { isCapture, manifestUrl } from './address.js';
+import { isCapture, manifestUrl, pathUrl, textureMemory } from './address.js';
 import { createHooks, type Hooks } from './capture.js';
+import { parsePath, type PathFile } from './path.js';
 import { Session } from './session.js';
 import { explain } from './state.js';
 import { Interface, Problem } from './ui.js';
@@ -30,6 +32,12 @@ function textureMegabytes(): number {
   return memory <= 4 || coarse ? 128 : 256;
 }
 
+async function playable(url: string): Promise<PathFile> {
+  const response = await fetch(url);
+  if (!response.ok) throw new FarfieldError('format', `There is no path to play at ${url}.`);
+  return parsePath(await response.text());
+}
+
 function open(ui: HTMLElement, canvas: HTMLCanvasElement): void {
   const page = new URL(location.href);
   const url = manifestUrl(page);
@@ -49,7 +57,7 @@ function open(ui: HTMLElement, canvas: HTMLCanvasElement): void {
     canvas,
     manifestUrl: url,
     capture,
-    textureBytes: textureMegabytes() * 2 ** 20,
+    textureBytes: (textureMemory(page) ?? textureMegabytes()) * 2 ** 20,
   });
   window.farfield = createHooks(session);
   window.farfield.ready.catch(() => undefined);
@@ -66,6 +74,18 @@ function open(ui: HTMLElement, canvas: HTMLCanvasElement): void {
   session.walk.addEventListener('context-restored', () => {
     delete document.body.dataset.lost;
   });
+  const path = pathUrl(page);
+  if (path !== undefined) {
+    Promise.all([playable(path), window.farfield.ready]).then(
+      ([file]) => session.play(file),
+      (error: unknown) => {
+        if (session.walk.manifest !== undefined) {
+          const { title, text } = explain(asError(error));
+          fail(title, text);
+        }
+      },
+    );
+  }
   if (!capture) render(<Interface session={session} />, ui);
 }
 

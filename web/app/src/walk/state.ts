@@ -2,6 +2,7 @@
 
 import type { WalkStats } from '@farfield/three';
 import type { Session } from './session.js';
+import { walkingSpeed } from './walker.js';
 
 export interface ViewState {
   readonly phase: 'opening' | 'first-cell' | 'walking';
@@ -11,7 +12,10 @@ export interface ViewState {
   readonly frameTimes: readonly number[];
   /** A short remark about what is going on, or nothing. */
   readonly remark: string | undefined;
-  readonly pace: number;
+  /** Metres a second that walking goes at. */
+  readonly speed: number;
+  readonly playing: boolean;
+  readonly recording: boolean;
   readonly flying: boolean;
 }
 
@@ -27,12 +31,21 @@ export function readState(session: Session): ViewState {
     fps: mean === 0 ? 0 : 1000 / mean,
     frameTimes: [...frameTimes],
     remark: remark(session),
-    pace: walker.pace,
+    speed: speed(session),
+    playing: session.playback !== undefined,
+    recording: session.recorder !== undefined,
     flying: walker.flying,
   };
 }
 
+function speed({ walk, walker }: Session): number {
+  const size = walk.index?.grid.size;
+  if (size === undefined) return 0;
+  return Math.min(walk.topSpeed, walker.pace * walkingSpeed(Math.min(size[0], size[2])));
+}
+
 function remark({ walk, walker }: Session): string | undefined {
+  if (!navigator.onLine) return 'You are offline. What has been loaded can still be walked.';
   const wanted = walk.wanted;
   if (wanted !== undefined && !walk.settled) {
     if (wanted.state === 'absent') return 'This part is still being baked.';
@@ -41,7 +54,7 @@ function remark({ walk, walker }: Session): string | undefined {
     }
     if (walk.cell !== undefined) return 'Loading this part…';
   }
-  return walker.blocked ? 'The corridor ends here.' : undefined;
+  return walker.blocked ? 'The corridor ends here: nothing beyond it is baked.' : undefined;
 }
 
 /** An error in words for whoever opened the page. */

@@ -2,10 +2,14 @@
 
 import { useEffect, useState } from 'preact/hooks';
 import type { JSX } from 'preact';
+import { Compare } from './compare.js';
 import { Help } from './help.js';
+import { saveFile } from './save.js';
+import { Recorder } from './path.js';
 import { Readout } from './readout.js';
 import type { Session } from './session.js';
 import { readState, type ViewState } from './state.js';
+import { headsetOffered } from './xr.js';
 
 /** How long a remark must last before it is shown, and then stays, milliseconds. */
 const REMARK_DELAY = 350;
@@ -16,22 +20,52 @@ export function Interface({ session }: { session: Session }): JSX.Element {
   const remark = useSteady(state.remark);
   const [panel, setPanel] = useState(() => window.matchMedia('(min-width: 700px)').matches);
   const [help, setHelp] = useState(false);
+  const [compare, setCompare] = useState(false);
+  const [headset, setHeadset] = useState(false);
+  const { comparison } = session;
+  const toggleCompare = (open: boolean): void => {
+    setCompare(open);
+    comparison.mode = open ? 'split' : 'walk';
+    if (open && comparison.state !== 'ready' && comparison.state !== 'loading') {
+      void comparison.load().then(() => {
+        if (comparison.state === 'ready') comparison.mode = 'split';
+      });
+    }
+  };
+  useEffect(() => void headsetOffered().then(setHeadset), []);
   useEffect(() => {
+    const pace = (steps: number): void => {
+      session.walker.pace = Math.min(16, Math.max(0.125, session.walker.pace * 2 ** (steps / 4)));
+    };
     session.controls.onKey = (code) => {
+      if (code === 'Equal' || code === 'NumpadAdd') pace(1);
+      if (code === 'Minus' || code === 'NumpadSubtract') pace(-1);
+      if (code === 'KeyX') session.walk.frozen = !session.walk.frozen;
+      if (code === 'KeyB' && comparison.offered) toggleCompare(comparison.mode === 'walk');
+      if (code === 'KeyO') saveScreenshot(session);
+      if (code === 'KeyK') toggleRecording(session);
       if (code === '?' || code === 'KeyH') setHelp((open) => !open);
       if (code === 'KeyP') setPanel((open) => !open);
       if (code === 'KeyG') session.walker.flying = !session.walker.flying;
       if (code === 'Escape') setHelp(false);
     };
-    session.controls.onWheel = (steps) => {
-      session.walker.pace = Math.min(16, Math.max(0.125, session.walker.pace * 2 ** (steps / 4)));
-    };
+    session.controls.onWheel = pace;
   }, [session]);
   return (
     <>
       <header class="bar">
         <h1 class="title">{state.name}</h1>
         <nav class="buttons">
+          {state.phase === 'walking' && headset ? (
+            <button type="button" onClick={() => void session.headset.enter()}>
+              VR
+            </button>
+          ) : null}
+          {state.phase === 'walking' && comparison.offered ? (
+            <button type="button" aria-pressed={compare} onClick={() => toggleCompare(!compare)}>
+              Compare
+            </button>
+          ) : null}
           <button type="button" aria-pressed={panel} onClick={() => setPanel(!panel)}>
             Figures
           </button>
@@ -40,9 +74,13 @@ export function Interface({ session }: { session: Session }): JSX.Element {
           </button>
         </nav>
       </header>
-      {panel && state.phase === 'walking' ? <Readout state={state} /> : null}
+      {panel && state.phase === 'walking' ? <Readout state={state} session={session} /> : null}
       {state.phase === 'walking' ? null : <Opening state={state} />}
       <Thumb session={session} />
+      {compare && state.phase === 'walking' ? (
+        <Compare session={session} close={() => toggleCompare(false)} />
+      ) : null}
+      {state.recording ? <p class="recording">Recording your path: K ends it</p> : null}
       {state.phase === 'walking' ? (
         <p class="remark" role="status" data-shown={remark !== undefined}>
           {remark ?? ''}
@@ -52,6 +90,23 @@ export function Interface({ session }: { session: Session }): JSX.Element {
       {help ? <Help close={() => setHelp(false)} flying={state.flying} /> : null}
     </>
   );
+}
+
+/** What is drawn now, without the interface, as a picture file. */
+function saveScreenshot(session: Session): void {
+  session.draw();
+  session.renderer.domElement.toBlob((blob) => {
+    if (blob !== null) saveFile(blob, `${session.walk.manifest?.walk.name ?? 'walk'}.png`);
+  });
+}
+
+/** Begin to record a path, or end it and save it. */
+function toggleRecording(session: Session): void {
+  const { recorder } = session;
+  session.recorder = recorder === undefined ? new Recorder() : undefined;
+  if (recorder === undefined) return;
+  const blob = new Blob([JSON.stringify(recorder.file)], { type: 'application/json' });
+  saveFile(blob, 'path.json');
 }
 
 export function Problem({ title, text }: { title: string; text: string }): JSX.Element {

@@ -4,7 +4,14 @@ import { FarfieldError, asError, AbortedError } from './errors.js';
 import type { CellFile, NearReference, Vec3 } from './format.js';
 import { WALK_VERSION } from './format.js';
 import { buildNearBatches, type NearBatch, type NearSource } from './near.js';
+import {
+  findObjects,
+  type FindOptions,
+  type FoundObjects,
+  type Triangles,
+} from './objects/find-objects.js';
 import { buildQuadVertices, type QuadVertices } from './quads.js';
+import { buildSolid, type SolidData } from './solid.js';
 
 /** What a cell file says, ready to upload. */
 export interface BuiltCell {
@@ -14,10 +21,19 @@ export interface BuiltCell {
   readonly near: readonly NearReference[];
 }
 
+/** The near field of a cell: what to draw and what to bump into. */
+export interface BuiltNear {
+  readonly batches: NearBatch[];
+  readonly solid: SolidData;
+}
+
 export interface CellBuilder {
   /** Build a cell from its file's bytes, which may be taken away from the caller. */
   cell(bytes: ArrayBuffer, resolution: number): Promise<BuiltCell>;
-  near(sources: readonly NearSource[], centre: Vec3): Promise<NearBatch[]>;
+  /** Build the near field of the cell of `size` at `centre`. */
+  near(sources: readonly NearSource[], centre: Vec3, size: Vec3): Promise<BuiltNear>;
+  /** Find the objects of a near field; the caller keeps its arrays. */
+  objects(batches: readonly Triangles[], options: FindOptions): Promise<FoundObjects>;
   dispose(): void;
 }
 
@@ -41,14 +57,23 @@ export function buildCell(bytes: ArrayBuffer, resolution: number): BuiltCell {
   };
 }
 
+function buildNear(sources: readonly NearSource[], centre: Vec3, size: Vec3): BuiltNear {
+  const batches = buildNearBatches(sources, centre);
+  return { batches, solid: buildSolid(batches, centre, size) };
+}
+
 /** Builds on the calling thread. */
 export class InlineBuilder implements CellBuilder {
   async cell(bytes: ArrayBuffer, resolution: number): Promise<BuiltCell> {
     return Promise.resolve(buildCell(bytes, resolution));
   }
 
-  async near(sources: readonly NearSource[], centre: Vec3): Promise<NearBatch[]> {
-    return Promise.resolve(buildNearBatches(sources, centre));
+  async near(sources: readonly NearSource[], centre: Vec3, size: Vec3): Promise<BuiltNear> {
+    return Promise.resolve(buildNear(sources, centre, size));
+  }
+
+  async objects(batches: readonly Triangles[], options: FindOptions): Promise<FoundObjects> {
+    return Promise.resolve(findObjects(batches, options));
   }
 
   dispose(): void {
@@ -58,10 +83,11 @@ export class InlineBuilder implements CellBuilder {
 
 export type BuildRequest =
   | { id: number; kind: 'cell'; bytes: ArrayBuffer; resolution: number }
-  | { id: number; kind: 'near'; sources: readonly NearSource[]; centre: Vec3 };
+  | { id: number; kind: 'near'; sources: readonly NearSource[]; centre: Vec3; size: Vec3 }
+  | { id: number; kind: 'objects'; batches: readonly Triangles[]; options: FindOptions };
 
 export type BuildReply =
-  { id: number; value: BuiltCell | NearBatch[] } | { id: number; error: string };
+  { id: number; value: BuiltCell | BuiltNear | FoundObjects } | { id: number; error: string };
 
 interface Waiting {
   readonly resolve: (value: never) => void;
@@ -92,8 +118,12 @@ export class WorkerBuilder implements CellBuilder {
     return this.ask({ id: this.next++, kind: 'cell', bytes, resolution }, [bytes]);
   }
 
-  near(sources: readonly NearSource[], centre: Vec3): Promise<NearBatch[]> {
-    return this.ask({ id: this.next++, kind: 'near', sources, centre }, []);
+  near(sources: readonly NearSource[], centre: Vec3, size: Vec3): Promise<BuiltNear> {
+    return this.ask({ id: this.next++, kind: 'near', sources, centre, size }, []);
+  }
+
+  objects(batches: readonly Triangles[], options: FindOptions): Promise<FoundObjects> {
+    return this.ask({ id: this.next++, kind: 'objects', batches, options }, []);
   }
 
   dispose(): void {
@@ -101,7 +131,7 @@ export class WorkerBuilder implements CellBuilder {
     this.fail(new AbortedError());
   }
 
-  private ask<T extends BuiltCell | NearBatch[]>(
+  private ask<T extends BuiltCell | BuiltNear | FoundObjects>(
     request: BuildRequest,
     transfer: Transferable[],
   ): Promise<T> {
@@ -128,14 +158,23 @@ export function answer(request: BuildRequest): { reply: BuildReply; transfer: Ar
         transfer: [positions.buffer, texels.buffer, indices.buffer],
       };
     }
-    const value = buildNearBatches(request.sources, request.centre);
-    const transfer = value.flatMap(({ positions, normals, uvs, colors, indices }) => [
+    if (request.kind === 'objects') {
+      const value = findObjects(request.batches, request.options);
+      return {
+        reply: { id: request.id, value },
+        transfer: value.batches.map(({ indices }) => indices.buffer),
+      };
+    }
+    const value = buildNear(request.sources, request.centre, request.size);
+    const { corners, starts, items } = value.solid;
+    const transfer = value.batches.flatMap(({ positions, normals, uvs, colors, indices }) => [
       positions.buffer,
       normals.buffer,
       uvs.buffer,
       colors.buffer,
       indices.buffer,
     ]);
+    transfer.push(corners.buffer, starts.buffer, items.buffer);
     return { reply: { id: request.id, value }, transfer };
   } catch (error) {
     return { reply: { id: request.id, error: asError(error).message }, transfer: [] };

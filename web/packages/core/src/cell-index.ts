@@ -63,7 +63,8 @@ export class CellIndex {
   async ensure(point: Vec3, radius: number): Promise<void> {
     const distance = (page: Page): number =>
       boxDistance(page.page.bounds.min, page.page.bounds.max, point);
-    const wanted = this.pages.filter((page) => distance(page) <= radius);
+    const reach = radius + 1e-6 * this.cellSize;
+    const wanted = this.pages.filter((page) => distance(page) <= reach);
     const missing = wanted.filter((page) => page.lookup === undefined);
     if (missing.length === 0) return;
     missing.sort((a, b) => distance(a) - distance(b));
@@ -129,8 +130,10 @@ export class CellIndex {
   }
 
   private lookups(point: Vec3, radius: number): CellLookup[] {
+    // Bounds are rounded: a point on a page's side may lie a hair outside them.
+    const reach = radius + 1e-6 * this.cellSize;
     return this.pages.flatMap(({ page, lookup }) =>
-      lookup !== undefined && boxDistance(page.bounds.min, page.bounds.max, point) <= radius
+      lookup !== undefined && boxDistance(page.bounds.min, page.bounds.max, point) <= reach
         ? [lookup]
         : [],
     );

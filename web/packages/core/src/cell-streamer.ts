@@ -296,7 +296,7 @@ function isTooLarge(error: Error | undefined): boolean {
   return error instanceof FarfieldError && error.code === 'too-large';
 }
 
-/** How far around the walker cells are looked at: a cell and a half, more at speed. */
+/** How far around the walker cells are looked at: three and a half cells, more at speed. */
 function reach(velocity: Vec3, size: Vec3): number {
-  return 1.5 * Math.max(...size) + Math.min(4 * Math.max(...size), 3 * Math.hypot(...velocity));
+  return 3.5 * Math.max(...size) + Math.min(4 * Math.max(...size), 3 * Math.hypot(...velocity));
 }

@@ -10,10 +10,17 @@ import { FACES } from './faces.js';
 import { FarfieldError } from './errors.js';
 import type { CellFile } from './format.js';
 
+/** Pages a cell may have, and quads that are told apart: their product fits single precision. */
+export const PAGES = 2048;
+export const QUADS = 8192;
+
 export interface QuadVertices {
   /** 4 per vertex: homogeneous position relative to the cell's centre. */
   readonly positions: Float32Array<ArrayBuffer>;
-  /** 3 per vertex: texel column and row on the page, and the index of the page in `atlases`. */
+  /**
+   * 3 per vertex: texel column and row on the page, and the index of the page in `atlases` plus
+   * PAGES times the quad's number (for overlays; it starts again after QUADS of them).
+   */
   readonly texels: Float32Array<ArrayBuffer>;
   /** 3 per triangle, in the order of the file: front to back. */
   readonly indices: Uint32Array<ArrayBuffer>;
@@ -58,7 +65,7 @@ export function buildQuadVertices(cell: CellFile, resolution: number): QuadVerti
       positions[4 * vertex + 3] = d;
       texels[3 * vertex] = scale * (turned ? y : x) + quads.offsets[2 * q];
       texels[3 * vertex + 1] = scale * (turned ? x : y) + quads.offsets[2 * q + 1];
-      texels[3 * vertex + 2] = quads.pages[q];
+      texels[3 * vertex + 2] = quads.pages[q] + PAGES * (q % QUADS);
       if (corner >= 2) {
         indices[index++] = first;
         indices[index++] = vertex - 1;
@@ -90,6 +97,9 @@ function checkColumns(cell: CellFile, vertices: number): void {
         `Column "${name}" has ${has} entries where ${wants} are needed.`,
       );
     }
+  }
+  if (cell.atlases.length > PAGES) {
+    throw new FarfieldError('format', `A cell has more than ${PAGES} atlas pages.`);
   }
   const outside = (column: readonly number[], limit: number): boolean =>
     column.some((value) => !(value >= 0 && value < limit));

@@ -66,7 +66,7 @@ describe('builders', () => {
     const remote = await builder.cell(bytes, 64);
     expect(bytes.byteLength).toBe(0);
     expect(remote).toEqual(await new InlineBuilder().cell(encode(CELL), 64));
-    expect(await builder.near([], [0, 0, 0])).toEqual([]);
+    expect((await builder.near([], [0, 0, 0], [10, 4, 10])).batches).toEqual([]);
   });
 
   test.each([

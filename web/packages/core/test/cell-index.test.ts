@@ -1,6 +1,6 @@
 import fc from 'fast-check';
 import { describe, expect, test } from 'vitest';
-import { CellIndex, cellDistance, type CellTable, type WalkGrid } from '../src/index.js';
+import { CellIndex, cellDistance, type CellTable, type Vec3, type WalkGrid } from '../src/index.js';
 import { grid, paged, vec3 } from './random.js';
 
 const EMPTY: CellTable = { i: [], j: [], k: [], y: [] };
@@ -90,6 +90,21 @@ describe('CellIndex', () => {
       ),
       { numRuns: 50 },
     );
+  });
+
+  test('a point on the rounded side of a page finds its cell', async () => {
+    // 6.5 lies in cell 3 by its index, but 0.2 + 3 * 2.1, where that cell begins, rounds above it.
+    const whole: WalkGrid & { cells: CellTable } = {
+      origin: [0.2, 0, 0],
+      size: [2.1, 1, 1],
+      total: 4,
+      cells: { i: [0, 1, 2, 3], j: [0, 0, 0, 0], k: [0, 0, 0, 0], y: [0, 0, 0, 0] },
+    };
+    const { grid: withPages, tables } = paged(whole, 3);
+    const index = new CellIndex(withPages, (href) => Promise.resolve(tables.get(href) ?? EMPTY));
+    const point: Vec3 = [6.5, 0.5, 0.5];
+    await index.ensure(point, 0);
+    expect(index.at(point)?.name).toBe('3_0_0');
   });
 
   test('of a million cells only the pages around the walker are held', async () => {

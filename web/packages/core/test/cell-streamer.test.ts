@@ -233,6 +233,43 @@ describe('CellStreamer', () => {
     expect(streamer.settled).toBe(true);
   });
 
+  test('the own cell takes the shown one’s memory when nothing else is left to give', async () => {
+    const { streamer, look, open, tick, views } = setUp({ capacity: 10 });
+    streamer.update(look(HERE));
+    open()[0].finish(10);
+    await tick();
+    expect(streamer.update(look(HERE))?.name).toBe('4_0_4');
+    const beyond = look([55, 2, 45]);
+    streamer.update(beyond);
+    open().forEach((load) => load.finish(10));
+    await tick();
+    // Never both, and never stuck with the cell that was left behind.
+    expect(streamer.update(beyond)?.name).toBe('5_0_4');
+    expect(streamer.bytes).toBe(10);
+    expect(views[0].disposed).toBe(true);
+  });
+
+  test('pages that a load is short of come from the shown cell only for the own cell', async () => {
+    const { streamer, look, open, tick, views } = setUp({ prefetch: 2 });
+    streamer.update(look(HERE));
+    open()[0].finish();
+    await tick();
+    streamer.update(look(HERE));
+    expect(open().map(({ job }) => job.priority())).toEqual([1]);
+    // A neighbour short of memory gets nothing from what is seen.
+    expect(streamer.evict(1)).toBe(false);
+    const beyond = look([75, 2, 75]);
+    streamer.update(beyond);
+    expect(streamer.shown?.name).toBe('4_0_4');
+    expect(streamer.evict(0)).toBe(true);
+    expect(views[0].disposed).toBe(true);
+    expect(streamer.shown).toBeUndefined();
+    expect(streamer.evict(0)).toBe(false);
+    open()[0].finish();
+    await tick();
+    expect(streamer.update(beyond)?.name).toBe('7_0_7');
+  });
+
   test('loads give way to what matters more, the last in the order first', async () => {
     const { streamer, loads, look, open, tick } = setUp();
     streamer.update(look(HERE));

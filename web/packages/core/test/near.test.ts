@@ -49,7 +49,7 @@ const build = (sources: NearSource[], centre: [number, number, number] = [0, 0, 
   buildNearBatches(sources, centre);
 
 describe('buildNearBatches', () => {
-  test('draws exactly the listed triangles, where they are', () => {
+  test('draws exactly the listed triangles, where they are, the nearest first', () => {
     fc.assert(
       fc.property(
         fc.array(fc.tuple(fc.nat(3), fc.nat(4)), { minLength: 1, maxLength: 4 }),
@@ -57,15 +57,21 @@ describe('buildNearBatches', () => {
         (pairs, [x, y, z]) => {
           const ranges = pairs.flatMap(([first, count]) => [0, first, Math.min(count, 4 - first)]);
           const [batch] = build([{ bytes: block([{}]), ranges }], [x, y, z]);
-          const wanted: number[] = [];
+          const listed: number[][] = [];
           for (let n = 0; n < ranges.length; n += 3) {
-            for (let c = 3 * ranges[n + 1]; c < 3 * (ranges[n + 1] + ranges[n + 2]); c++) {
-              for (const axis of [0, 1, 2]) {
-                const stored = (4 * TRIANGLES[c] + axis) * 7;
-                wanted.push(START[axis] + STEP * stored - [x, y, z][axis]);
-              }
+            for (let t = ranges[n + 1]; t < ranges[n + 1] + ranges[n + 2]; t++) {
+              const corners = TRIANGLES.slice(3 * t, 3 * t + 3).flatMap((vertex) =>
+                [0, 1, 2].map(
+                  (axis) => START[axis] + STEP * (4 * vertex + axis) * 7 - [x, y, z][axis],
+                ),
+              );
+              listed.push(corners);
             }
           }
+          const distance = (corners: number[]): number =>
+            Math.min(...[0, 3, 6].map((c) => Math.hypot(...corners.slice(c, c + 3))));
+          // Sorting is stable: among equals the order of the files stays.
+          const wanted = listed.sort((a, b) => distance(a) - distance(b)).flat();
           const got = [...batch.indices].flatMap((vertex) => [
             ...batch.positions.subarray(3 * vertex, 3 * vertex + 3),
           ]);

@@ -1,6 +1,14 @@
 import fc from 'fast-check';
 import { describe, expect, test } from 'vitest';
-import { FACES, FarfieldError, buildQuadVertices, type CellFile, type Vec3 } from '../src/index.js';
+import {
+  FACES,
+  FarfieldError,
+  PAGES,
+  QUADS,
+  buildQuadVertices,
+  type CellFile,
+  type Vec3,
+} from '../src/index.js';
 import { near, vec3 } from './random.js';
 
 const dot = (a: Vec3, b: Vec3): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -90,7 +98,7 @@ describe('buildQuadVertices', () => {
   });
 
   test('polygons become fans in the order of the file', () => {
-    const { indices, quads } = buildQuadVertices(
+    const { indices, quads, texels } = buildQuadVertices(
       cellWith(
         {
           eyes: [0, 0],
@@ -110,6 +118,11 @@ describe('buildQuadVertices', () => {
     );
     expect(quads).toBe(2);
     expect([...indices]).toEqual([0, 1, 2, 0, 2, 3, 4, 5, 6]);
+    // The third coordinate tells the page and the quad.
+    const codes = [...texels].filter((_, n) => n % 3 === 2);
+    expect(codes.map((code) => code % PAGES)).toEqual([0, 0, 0, 0, 1, 1, 1]);
+    expect(codes.map((code) => Math.floor(code / PAGES))).toEqual([0, 0, 0, 0, 1, 1, 1]);
+    expect(Math.fround(PAGES * QUADS - 1)).toBe(PAGES * QUADS - 1);
   });
 
   test('a corner at infinity has w 0, also where rounding makes it negative', () => {

@@ -3,6 +3,7 @@
 import {
   FarfieldError,
   SharedStore,
+  Solid,
   type BuiltCell,
   type CellBuilder,
   type FetchQueue,
@@ -101,7 +102,7 @@ export class CellLoader {
     const allNear = this.near(cell, job, user, held);
     await Promise.allSettled([allSlots, allNear]);
     const slots = await allSlots;
-    const { batches, textures } = await allNear;
+    const { batches, solid, textures } = await allNear;
     const view = new CellView(
       cell,
       slots,
@@ -114,6 +115,7 @@ export class CellLoader {
           state.emissiveMap === undefined ? undefined : textures.get(state.emissiveMap),
         ),
       ),
+      solid,
       release,
     );
     try {
@@ -132,18 +134,18 @@ export class CellLoader {
     job: Job,
     user: User,
     held: (() => void)[],
-  ): Promise<{ batches: NearBatch[]; textures: Map<NearTexture, Texture> }> {
-    const { builder } = this.parts;
+  ): Promise<{ batches: NearBatch[]; solid: Solid; textures: Map<NearTexture, Texture> }> {
+    const { builder, manifest } = this.parts;
     const sources = await settleAll(
       cell.near.map(async ({ blob, ranges }) => {
         held.push(() => this.blocks.release(blob, user));
         return { bytes: await abortable(this.blocks.acquire(blob, user), job.signal), ranges };
       }),
     );
-    const built = sources.length === 0 ? [] : await builder.near(sources, cell.centre);
+    const built = await builder.near(sources, cell.centre, manifest.walk.grid.size);
     for (const { blob } of cell.near) this.blocks.release(blob, user);
     job.signal.throwIfAborted();
-    const batches = built.map((batch) => ({ ...batch, state: this.absolute(batch.state) }));
+    const batches = built.batches.map((batch) => ({ ...batch, state: this.absolute(batch.state) }));
     const wanted = batches
       .flatMap(({ state }) => [state.map, state.emissiveMap])
       .filter((texture) => texture !== undefined);
@@ -154,7 +156,7 @@ export class CellLoader {
         return [texture, loaded] as const;
       }),
     );
-    return { batches, textures: new Map(textures) };
+    return { batches, solid: new Solid(built.solid), textures: new Map(textures) };
   }
 
   /** The state with its textures' addresses made absolute, so that blocks share them. */

@@ -1,6 +1,6 @@
 /** One complete cell as three.js objects: one mesh for all far quads, one per near draw state. */
 
-import type { BuiltCell, NearBatch } from '@farfield/core';
+import { PAGES, type BuiltCell, type NearBatch, type Solid } from '@farfield/core';
 import {
   BufferAttribute,
   BufferGeometry,
@@ -18,6 +18,8 @@ export class CellView {
   readonly near: readonly WalkMesh[];
   readonly quads: number;
   readonly nearTriangles: number;
+  /** What a walker in the cell stands on and bumps into. */
+  readonly solid: Solid;
   /** Bytes of all vertex and index buffers. */
   readonly bytes: number;
   private readonly release: () => void;
@@ -25,6 +27,7 @@ export class CellView {
   /**
    * @param slots slot in the page pool of each of the cell's pages
    * @param nearMaterials a material for each batch
+   * @param solid the near field as obstacles
    * @param release called once, when the view is disposed of
    */
   constructor(
@@ -33,14 +36,19 @@ export class CellView {
     farMaterial: RawShaderMaterial,
     batches: readonly NearBatch[],
     nearMaterials: readonly RawShaderMaterial[],
+    solid: Solid,
     release: () => void,
   ) {
     this.release = release;
+    this.solid = solid;
     this.quads = cell.far.quads;
     this.group.name = 'farfield cell';
     this.group.position.set(...cell.centre);
     this.group.visible = false;
-    this.near = batches.map((batch, n) => mesh(nearGeometry(batch), nearMaterials[n], 0));
+    // In the order of the batches, nearest first, whatever their materials.
+    this.near = batches.map((batch, n) =>
+      mesh(nearGeometry(batch), nearMaterials[n], n / batches.length),
+    );
     this.far = this.quads === 0 ? undefined : mesh(farGeometry(cell, slots), farMaterial, 1);
     for (const object of this.near) this.group.add(object);
     if (this.far !== undefined) this.group.add(this.far);
@@ -78,7 +86,10 @@ function mesh(geometry: BufferGeometry, material: RawShaderMaterial, order: numb
 
 function farGeometry({ far }: BuiltCell, slots: readonly number[]): BufferGeometry {
   const { texels } = far;
-  for (let n = 2; n < texels.length; n += 3) texels[n] = slots[texels[n]];
+  for (let n = 2; n < texels.length; n += 3) {
+    const page = texels[n] % PAGES;
+    texels[n] += slots[page] - page;
+  }
   const geometry = new BufferGeometry();
   geometry.setAttribute('position', new BufferAttribute(far.positions, 4));
   geometry.setAttribute('texel', new BufferAttribute(texels, 3));

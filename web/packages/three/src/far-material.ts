@@ -1,6 +1,7 @@
 /** Draws all quads of a cell: homogeneous vertices, pages in one texture array, colours as stored. */
 
 import { GLSL3, LessDepth, DoubleSide, RawShaderMaterial, type DataArrayTexture } from 'three';
+import { PAGES } from '@farfield/core';
 import { CLIP_GLSL } from './projection.js';
 
 const VERTEX = `
@@ -11,10 +12,19 @@ in vec4 position;
 in vec3 texel;
 out vec2 v_texel;
 flat out int v_slot;
+#ifdef TINT
+flat out vec3 v_tint;
+#endif
 ${CLIP_GLSL}
 void main() {
   v_texel = texel.xy;
-  v_slot = int(texel.z);
+  int code = int(texel.z);
+  v_slot = code % ${PAGES};
+#ifdef TINT
+  // TINT 1: by quad. TINT 2: by layer, whose disparity all its corners have.
+  float key = TINT == 1 ? 2.39996 * float(code / ${PAGES}) : 60.0 * log(max(position.w, 1e-7));
+  v_tint = 0.5 + 0.5 * cos(key + vec3(0.0, 2.1, 4.2));
+#endif
   gl_Position = ff_clip(projectionMatrix, modelViewMatrix * position);
 }
 `;
@@ -26,11 +36,17 @@ precision highp sampler2DArray;
 uniform sampler2DArray ff_pages;
 in vec2 v_texel;
 flat in int v_slot;
+#ifdef TINT
+flat in vec3 v_tint;
+#endif
 out vec4 color;
 void main() {
   vec4 texel = texelFetch(ff_pages, ivec3(floor(v_texel), v_slot), 0);
   if (texel.a < 0.5) discard;
   color = vec4(texel.rgb, 1.0);
+#ifdef TINT
+  color.rgb = mix(color.rgb, v_tint, 0.55);
+#endif
 }
 `;
 
@@ -45,4 +61,9 @@ export function createFarMaterial(pages: DataArrayTexture): RawShaderMaterial {
     depthFunc: LessDepth,
     toneMapped: false,
   });
+}
+
+/** The number of the quad that a vertex belongs to, from its third texel coordinate. */
+export function quadOf(code: number): number {
+  return Math.floor(code / PAGES);
 }

@@ -1,6 +1,6 @@
-/** Draws near polygons with the baker's light model, clipped to the near field of their cell. */
+/** Draws near polygons with the baker's light model, clipped a little outside their cell's near field. */
 
-import { stateKey, type NearState } from '@farfield/core';
+import { NEAR_OVERLAP, stateKey, type NearState } from '@farfield/core';
 import {
   DoubleSide,
   FrontSide,
@@ -94,7 +94,11 @@ export class NearMaterials {
   private readonly materials = new Map<string, RawShaderMaterial>();
 
   constructor(light: Uniforms, nearField: number) {
-    this.shared = { ...light, ff_near_field: { value: nearField }, ff_top: this.top };
+    this.shared = {
+      ...light,
+      ff_near_field: { value: NEAR_OVERLAP * nearField },
+      ff_top: this.top,
+    };
   }
 
   /** The material of a state, drawing with these textures. */

@@ -5,6 +5,7 @@
 
 import {
   FarfieldError,
+  PAGES,
   SharedStore,
   type FetchQueue,
   type Loading,
@@ -37,7 +38,7 @@ export class PagePool {
     this.options = options;
     const { width, height } = options.manifest.walk.atlas;
     const gl = options.renderer.getContext() as WebGL2RenderingContext;
-    const layers = gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS) as number;
+    const layers = Math.min(PAGES, gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS) as number);
     if (Math.max(width, height) > options.renderer.capabilities.maxTextureSize) {
       throw new FarfieldError(
         'unsupported',

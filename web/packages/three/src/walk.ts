@@ -12,6 +12,7 @@ import {
   type CellBuilder,
   type CellTable,
   type Manifest,
+  type Solid,
   type Vec3,
 } from '@farfield/core';
 import {
@@ -20,10 +21,13 @@ import {
   Vector3,
   type Camera,
   type IUniform,
+  type Object3D,
   type WebGLRenderer,
 } from 'three';
 import type { CellView } from './cell-view.js';
 import { MotionTracker } from './motion.js';
+import type { ImpostorOptions } from './objects/object-impostor.js';
+import { WalkObjects, type NearImpostors } from './objects/walk-objects.js';
 import { Stage } from './stage.js';
 import { readStats, type WalkStats } from './stats.js';
 
@@ -44,6 +48,8 @@ export interface WalkOptions {
   readonly backgroundAlpha?: number;
   /** Downloads; share one between walks to share its limit of requests. */
   readonly queue?: FetchQueue;
+  /** Whether costly objects of the near field are drawn as impostors. Default 'never'. */
+  readonly nearImpostors?: NearImpostors;
 }
 
 export interface WalkEvents {
@@ -62,6 +68,8 @@ export interface WalkEvents {
 }
 
 const MEGABYTE = 2 ** 20;
+/** Cells ahead of a walker that prefetching counts on. */
+const LEAD = 1.5;
 
 export class Walk extends EventDispatcher<WalkEvents> {
   /** Add this to your scene. It may be moved and turned. */
@@ -73,6 +81,10 @@ export class Walk extends EventDispatcher<WalkEvents> {
   index: CellIndex | undefined;
   /** Keep the shown cell while the camera moves on. */
   frozen = false;
+  /** Draw cells; the sky is drawn without them too. */
+  visible = true;
+  /** Object impostors: what was placed with `add`, and objects of the near field. */
+  readonly objects: WalkObjects;
   private readonly options: WalkOptions;
   private readonly queue: FetchQueue;
   private readonly builder: CellBuilder;
@@ -81,7 +93,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
   private readonly alpha: IUniform<number>;
   private stage: Stage | undefined;
   private camera: Camera | undefined;
-  private view: CellView | undefined;
+  private shownView: CellView | undefined;
   private shown: Cell | undefined;
   private ensuredAt: Vec3 | undefined;
   private loadSeconds = 0;
@@ -93,6 +105,12 @@ export class Walk extends EventDispatcher<WalkEvents> {
     this.options = options;
     this.queue = options.queue ?? new FetchQueue();
     this.builder = createBuilder();
+    this.objects = new WalkObjects({
+      renderer: options.renderer,
+      builder: this.builder,
+      group: this.group,
+      near: options.nearImpostors ?? 'never',
+    });
     this.alpha = { value: options.backgroundAlpha ?? 1 };
     this.loaded = this.load();
     this.loaded.catch((error: unknown) => {
@@ -109,8 +127,8 @@ export class Walk extends EventDispatcher<WalkEvents> {
     this.camera = camera;
   }
 
-  /** Call once a frame, before drawing. */
-  update(): void {
+  /** Call once a frame, before drawing; `now` is the time for fades, in seconds. */
+  update(now = performance.now() / 1000): void {
     const { stage, camera, index } = this;
     if (stage === undefined || camera === undefined || index === undefined) return;
     camera.updateWorldMatrix(true, false);
@@ -120,18 +138,37 @@ export class Walk extends EventDispatcher<WalkEvents> {
     if (!this.frozen) {
       const view = stage.streamer.update(motion);
       const { shown } = stage.streamer;
-      if (view !== undefined && view !== this.view) {
-        if (this.view !== undefined) this.view.group.visible = false;
-        view.group.visible = true;
-        this.view = view;
+      if (view !== undefined && view !== this.shownView) {
+        if (this.shownView !== undefined) this.shownView.group.visible = false;
+        this.shownView = view;
         if (shown !== undefined && shown.name !== this.shown?.name) {
           this.shown = shown;
           this.dispatchEvent({ type: 'cell-change', cell: shown });
         }
       }
     }
+    this.showCells();
     stage.uploads.frame(this.options.uploadBytes ?? MEGABYTE);
     stage.attributes.update();
+    this.objects.update(this.view, this.manifest?.walk.near_field ?? Infinity, camera, now);
+  }
+
+  /**
+   * Place an object in the walk, in its coordinates: it is drawn as an impostor while a picture of
+   * it is good enough, and moves, turns and is animated like any other.
+   */
+  add(object: Object3D, options?: ImpostorOptions): void {
+    this.objects.add(object, options);
+  }
+
+  /** Take an object out of the walk. */
+  remove(object: Object3D): void {
+    this.objects.remove(object);
+  }
+
+  /** Make a change of `visible` count before the next `update`. */
+  showCells(): void {
+    if (this.shownView !== undefined) this.shownView.group.visible = this.visible;
   }
 
   /** Whether the camera's own cell is complete and shown. */
@@ -147,6 +184,23 @@ export class Walk extends EventDispatcher<WalkEvents> {
   /** The cell that is shown. */
   get cell(): Cell | undefined {
     return this.shown;
+  }
+
+  /** The shown cell's meshes. */
+  get view(): CellView | undefined {
+    return this.shownView;
+  }
+
+  /** What a walker in the shown cell stands on and bumps into. */
+  get solid(): Solid | undefined {
+    return this.shownView?.solid;
+  }
+
+  /** Metres a second at which cells still arrive in time, from how long they took to load lately. */
+  get topSpeed(): number {
+    const { index, loadSeconds } = this;
+    if (index === undefined || loadSeconds === 0) return Infinity;
+    return (LEAD * index.cellSize) / loadSeconds;
   }
 
   /** The cell that should be shown, and what has become of it. */
@@ -167,7 +221,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
   get stats(): WalkStats {
     return readStats({
       stage: this.stage,
-      view: this.view,
+      view: this.shownView,
       cell: this.shown,
       queue: this.queue,
       loadSeconds: this.loadSeconds,
@@ -186,6 +240,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
     domElement.removeEventListener('webglcontextlost', this.onContextLost);
     domElement.removeEventListener('webglcontextrestored', this.onContextRestored);
     if (typeof window !== 'undefined') window.removeEventListener('online', this.onOnline);
+    this.objects.dispose();
     this.stage?.dispose();
     this.stage = undefined;
     this.builder.dispose();
@@ -259,10 +314,11 @@ export class Walk extends EventDispatcher<WalkEvents> {
 
   private readonly onContextLost = (event: Event): void => {
     event.preventDefault();
+    this.objects.forget();
     // Everything on the graphics card is gone, and can only be let go of before a new context comes.
     this.stage?.dispose();
     this.stage = undefined;
-    this.view = undefined;
+    this.shownView = undefined;
     this.shown = undefined;
     this.dispatchEvent({ type: 'context-lost' });
   };

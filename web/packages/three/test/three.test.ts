@@ -1,4 +1,11 @@
-import { InlineBuilder, UploadScheduler, type NearState } from '@farfield/core';
+import {
+  InlineBuilder,
+  PAGES,
+  Solid,
+  UploadScheduler,
+  buildSolid,
+  type NearState,
+} from '@farfield/core';
 import {
   BufferAttribute,
   BufferGeometry,
@@ -15,13 +22,14 @@ import { generate, target } from '../../../scripts/generate-shading.js';
 import { readFileSync } from 'node:fs';
 import { AttributeUpload } from '../src/attribute-upload.js';
 import { CellView } from '../src/cell-view.js';
-import { createFarMaterial } from '../src/far-material.js';
+import { createFarMaterial, quadOf } from '../src/far-material.js';
 import { lightUniforms } from '../src/light.js';
 import { MotionTracker } from '../src/motion.js';
 import { NearMaterials } from '../src/near-materials.js';
 import { LIGHT_GLSL } from '../src/shading.generated.js';
 import { setInfiniteFar } from '../src/index.js';
 
+const EMPTY = new Solid(buildSolid([], [1, 2, 3], [8, 8, 8]));
 const LIGHT = {
   ambient: [0.1, 0.1, 0.1],
   sun_direction: [0, 1, 0],
@@ -109,7 +117,7 @@ describe('NearMaterials', () => {
     expect(textured.defines).toEqual({ MAP: '', MASK: '' });
     expect(materials.get({ ...STATE, map, alpha: 'mask' }, second)).toBe(textured);
     expect(textured.uniforms.ff_map.value).toBe(second);
-    expect(textured.uniforms.ff_near_field.value).toBe(20);
+    expect(textured.uniforms.ff_near_field.value).toBe(21.25);
     expect(textured.uniforms.ff_sun).toBe(plain.uniforms.ff_sun);
     materials.dispose();
   });
@@ -142,11 +150,12 @@ describe('CellView', () => {
     const built = await new InlineBuilder().cell(bytes, 64);
     let released = 0;
     const material = createFarMaterial({} as never);
-    const view = new CellView(built, [7, 3], material, [], [], () => released++);
+    const view = new CellView(built, [7, 3], material, [], [], EMPTY, () => released++);
     const slots = [...(view.far?.geometry.attributes.texel.array ?? [])].filter(
       (_, n) => n % 3 === 2,
     );
-    expect(slots).toEqual([3, 3, 3, 7, 7, 7]);
+    expect(slots.map((slot) => slot % PAGES)).toEqual([3, 3, 3, 7, 7, 7]);
+    expect(slots.map(quadOf)).toEqual([0, 0, 0, 1, 1, 1]);
     expect(view.group.position.toArray()).toEqual([1, 2, 3]);
     // Six vertices of 4 + 3 floats, six indices.
     expect(view.bytes).toBe(6 * 7 * 4 + 6 * 4);
