@@ -1,11 +1,11 @@
 """Slanted quads against the paper's layers on one scene, at the same bound and near borders.
 
-    python -m bench.slanted [SCENE] [--json] [--keep]
+    python -m bench.slanted [SCENE] [--close] [--json] [--keep]
 
 SCENE is a name of tests/corridors/scenes.py, the demo city unless given. Two neighbouring cells of
 its corridor are baked both ways in one process on one core, with the near border that 64 layers
-have and with one four times closer; all figures are of the second cell, `seconds` its processor
-time, pictures from random eyes. A cell that the close border would cut keeps a tenth around it.
+have, or with `--close` one four times closer, but outside the cell by a tenth of its size. All
+figures are of the second cell, `seconds` its processor time, pictures from random eyes.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from typing import Any
 
 from bench.stand import one_process, report
 
-VIEWS = 8
+VIEWS = 4
 PICTURES = ("wrong", "missing", "extra", "flip")
 COUNTS = ("quads", "atlas_bytes", "near_triangles", "peak_megabytes")
 
 
-def figures(name: str) -> dict[str, Any]:
-    """Figures by near border and kind of quads."""
+def figures(name: str, close: bool) -> dict[str, Any]:
+    """Figures by kind of quads."""
     one_process()
     from farfield.target import prepared_scene  # noqa: PLC0415 - after the environment is set
     from farfield_core.settings import BakeSettings  # noqa: PLC0415
@@ -37,7 +37,16 @@ def figures(name: str) -> dict[str, Any]:
     scene = SCENES[name]
     size = (scene.cell_size,) * 3
     far = BakeSettings(quads="layers", cell_size=size, layers=64).near_field
-    table: dict[str, Any] = {}
+    border = max(far / 4, 0.6 * scene.cell_size) if close else far
+    # slanted quads start where the layers do that come nearest to the border asked for
+    layers = BakeSettings(quads="layers", cell_size=size, near=border + 1e-6)
+    near = layers.near_field
+    kinds = {
+        "slanted": BakeSettings(cell_size=size, near=near),
+        "layers": layers,
+        "layers, greedy": layers.model_copy(update={"grower": "greedy"}),
+    }
+    table = {}
     with tempfile.TemporaryDirectory(prefix="farfield-bench-") as folder:
         model = Path(folder) / "city.glb"
         if scene.source is None:
@@ -46,21 +55,15 @@ def figures(name: str) -> dict[str, Any]:
             model = scene.model
         store = Store.open(str(Path(folder) / "store"))
         info = prepared_scene(store, str(model))
-        for border in (far, max(far / 4, 0.6 * scene.cell_size)):
-            # slanted quads start where the layers do that come nearest to the border asked for
-            layers = BakeSettings(quads="layers", cell_size=size, near=border + 1e-6)
-            near = layers.near_field
-            kinds = {
-                "slanted": BakeSettings(cell_size=size, near=near),
-                "layers": layers,
-                "layers, greedy": layers.model_copy(update={"grower": "greedy"}),
-            }
-            row = table[f"{near:.1f}"] = {}
-            for kind, settings in kinds.items():
-                row[kind] = _cell(Path(folder), store, info.id, scene.corridor, settings)
-                if kind == "layers":
-                    row[kind]["layers"] = len(layers.place().layers)
-    return {"scene": name, "cell_size": scene.cell_size, "near": table}
+        for kind, settings in kinds.items():
+            table[kind] = _cell(Path(folder), store, info.id, scene.corridor, settings)
+    return {
+        "scene": name,
+        "cell_size": scene.cell_size,
+        "near": near,
+        "layers": len(layers.place().layers),
+        **table,
+    }
 
 
 def _cell(folder: Path, store: Any, scene: str, corridor: Path, settings: Any) -> dict[str, Any]:
@@ -99,5 +102,5 @@ def _cell(folder: Path, store: Any, scene: str, corridor: Path, settings: Any) -
 
 if __name__ == "__main__":
     names = [word for word in sys.argv[1:] if not word.startswith("--")]
-    chosen = names[0] if names else "city"
-    report(f"slanted_{chosen}", figures(chosen))
+    chosen, nearer = names[0] if names else "city", "--close" in sys.argv
+    report(f"slanted_{chosen}{'_close' if nearer else ''}", figures(chosen, nearer))

@@ -120,6 +120,9 @@ def test_settings_from_texts() -> None:
         ("alpha", "2"),
         ("gap_texels", "-1"),
         ("visibility", "maybe"),
+        ("grower", "greedy"),
+        ("renderer", "pyrender"),
+        ("supersample", "2"),
     ],
 )
 def test_bad_settings_are_one_sentence(name: str, text: str) -> None:

@@ -17,7 +17,8 @@ from farfield_core.scene import PreparedScene
 from numba import njit
 from numpy.typing import NDArray
 
-from farfield_worker.visibility.raster import Tiles, draw_clusters, hidden
+from farfield_worker.visibility.cutouts import OPAQUE, Cutouts
+from farfield_worker.visibility.raster import Tiles, draw_clusters
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -72,6 +73,7 @@ class Clusters:
         self._indices = np.asarray(scene.triangles)
         self._origin = scene.origin
         self._double_sided = np.array([b.double_sided for b in scene.info.batches], np.bool_)
+        self._cutouts = Cutouts.of(scene)
         self._batches = len(scene.info.batches)
         runs = [
             (part.batch, first, min(SIZE, part.first_triangle + part.triangles - first))
@@ -104,30 +106,29 @@ class Clusters:
         return some
 
     def draw(self, clusters: InView, eye: Floats, face: int, nearest: float, tiles: Tiles) -> None:
-        """Draw all triangles of `clusters` beyond Z = `nearest` into `tiles`, as if opaque."""
-        draw_clusters(
-            self._positions,
-            self._indices,
-            self.runs[clusters.cluster],
-            clusters.rect,
-            clusters.disparity,
-            ~self._double_sided,
-            np.asarray(eye, np.float64) - self._origin,
-            _axes(face),
-            nearest,
-            tiles.disparity,
-            tiles.triangle,
-            tiles.floor,
-            tiles.stale,
-        )
-
-    def not_hidden(self, clusters: InView, tiles: Tiles) -> InView:
-        """Those of `clusters` that what is drawn in `tiles` may not hide."""
-        keep = [
-            not hidden(rect, nearest, tiles.disparity, tiles.floor, tiles.stale)
-            for rect, nearest in zip(clusters.rect, clusters.disparity, strict=True)
-        ]
-        return clusters.take(np.array(keep, np.bool_))
+        """Draw all triangles of `clusters` beyond Z = `nearest` into `tiles`."""
+        opaque = self._cutouts.kind[self.runs[clusters.cluster, 0]] == OPAQUE
+        # what has holes comes last, when most of it is hidden
+        for part, cutouts in ((opaque, None), (~opaque, self._cutouts)):
+            if not part.any():
+                continue
+            some = clusters.take(part)
+            draw_clusters(
+                self._positions,
+                self._indices,
+                self.runs[some.cluster],
+                some.rect,
+                some.disparity,
+                ~self._double_sided,
+                cutouts,
+                np.asarray(eye, np.float64) - self._origin,
+                _axes(face),
+                nearest,
+                tiles.disparity,
+                tiles.triangle,
+                tiles.floor,
+                tiles.stale,
+            )
 
     def by_batch(self, triangles: Ints) -> ByBatch:
         """Group `triangles` (n,), the scene's indices, by batch."""

@@ -49,8 +49,7 @@ class MapSource(Protocol):
 class DepthMapRenderer:
     """Draws depth maps. Create it in the process that uses it, never before a fork.
 
-    Opaque triangles are rasterised by the processor (visibility/raster.py); those that one can see
-    through in places by GL, unless the others hide them.
+    Maps are rasterised by the processor (visibility/raster.py), pictures drawn by GL.
     """
 
     def __init__(
@@ -60,21 +59,12 @@ class DepthMapRenderer:
         self.resolution = resolution
         self.clusters = clusters or Clusters(scene)
         self.pictures = Pictures(scene, resolution)
-        self._opaque = np.array([b.alpha == "opaque" for b in scene.info.batches], np.bool_)
 
     def map(self, eye: Floats, face: int) -> DepthMap:
         """Depth map of `face` of `eye` (3,), scene coordinates."""
-        rest = self.clusters.in_view(eye, face, NEAREST, self.resolution)
-        opaque = self._opaque[self.clusters.runs[rest.cluster, 0]]
         tiles = Tiles(self.resolution)
-        self.clusters.draw(rest.take(opaque), eye, face, NEAREST, tiles)
-        rest = self.clusters.not_hidden(rest.take(~opaque), tiles)
-        triangles = self.clusters.triangles(rest, eye, face, NEAREST, self.resolution)
-        if len(triangles.triangles):
-            over = self.pictures.draw(eye, face, NEAREST, triangles)
-            nearer = over.disparity > tiles.disparity
-            tiles.disparity[nearer] = over.disparity[nearer]
-            tiles.triangle[nearer] = over.triangle[nearer]
+        clusters = self.clusters.in_view(eye, face, NEAREST, self.resolution)
+        self.clusters.draw(clusters, eye, face, NEAREST, tiles)
         return DepthMap(tiles.disparity, tiles.triangle)
 
     def picture(self, eye: Floats, face: int, triangles: NDArray[np.int32]) -> Picture:

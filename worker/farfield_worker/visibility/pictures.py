@@ -1,7 +1,7 @@
 """Pictures of a few triangles: disparity, colour and triangle of the nearest at each texel.
 
-Where a material lets a texel see through it, and what colour a surface has, only its textures
-tell; so this is drawn by GL, with the renderers' materials.
+What colour a surface has its textures and the light tell; so this is drawn by GL, with the
+renderers' materials.
 """
 
 from __future__ import annotations

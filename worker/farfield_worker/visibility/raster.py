@@ -7,6 +7,7 @@ the least that is drawn in each of the tiles of texels it covers (Greene, Kass, 
 one level and its minima kept up to date). Of the others every triangle is scan converted: in each
 row of texels, from where the row's middle enters the triangle to where it leaves it. Disparity is
 affine over the face, so it needs no division. A triangle that reaches behind the eye is clipped.
+Where a material has holes (visibility/cutouts.py), each texel's opacity is looked up.
 
 Sampled are texel centres, edges included, in double precision: neighbours leave no crack.
 """
@@ -18,6 +19,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+from farfield_worker.visibility.cutouts import DITHER, dithered, opacity
 
 #: texels across a tile
 TILE = 8
@@ -49,6 +52,7 @@ def draw_clusters(
     rects: Any,
     nearest_of: Any,
     one_sided: Any,
+    cutouts: Any,
     eye: Any,
     axes: Any,
     nearest: float,
@@ -60,19 +64,24 @@ def draw_clusters(
     """Draw clusters `runs` (k, 3), batch, first triangle, triangles, nearest first.
 
     `rects` (k, 4) and `nearest_of` (k,) are the texels that their bounds cover and the greatest
-    disparity of the bounds. `one_sided` says of each batch whether back faces are dropped; `eye`
-    (3,) is relative to the scene's origin, `axes` (3, 3) are right, down, forward. Nothing nearer
-    than Z = `nearest` is drawn. The last four are those of `Tiles`.
+    disparity of the bounds. `one_sided` says of each batch whether back faces are dropped;
+    `cutouts` are the materials' opacities, or None where all batches are opaque: numba then
+    compiles a faster kernel. `eye` (3,) is relative to the scene's origin, `axes` (3, 3) are right,
+    down, forward. Nothing nearer than Z = `nearest` is drawn. The last four are those of `Tiles`.
     """
     resolution = len(disparity)
     half = 0.5 * resolution
-    view = np.empty((3, 3))
-    clipped = np.empty((4, 3))
-    corner = np.empty((3, 3))
+    # right, down, forward, and texture coordinates and opacity; then column, row, disparity and
+    # the same times disparity
+    view = np.zeros((3, 6))
+    clipped = np.empty((4, 6))
+    corner = np.empty((3, 6))
+    slopes = np.empty((2, 4))
     for r in range(len(runs)):
         if hidden(rects[r], nearest_of[r], disparity, floor, stale):
             continue
-        drop = one_sided[runs[r, 0]]
+        batch = runs[r, 0]
+        drop = one_sided[batch]
         for t in range(runs[r, 1], runs[r, 1] + runs[r, 2]):
             left = right = above = below = True
             near, far = np.inf, -np.inf
@@ -90,23 +99,39 @@ def draw_clusters(
                 above, below = above and b < -c, below and b > c
             if far < nearest or left or right or above or below:
                 continue
+            if cutouts is not None:
+                for i in range(3):
+                    v = indices[t, i]
+                    view[i, 3], view[i, 4] = cutouts.uvs[v, 0], cutouts.uvs[v, 1]
+                    view[i, 5] = cutouts.colors[v, 3] / 65535.0
             if near >= nearest:
                 for i in range(3):
                     d = 1.0 / view[i, 2]
                     corner[i, 0] = (view[i, 0] * d + 1.0) * half
                     corner[i, 1] = (view[i, 1] * d + 1.0) * half
                     corner[i, 2] = d
-                _fill(corner, drop, t, disparity, triangle, stale)
+                    if cutouts is not None:
+                        for a in range(3, 6):
+                            corner[i, a] = view[i, a] * d
+                _fill(corner, slopes, drop, t, batch, cutouts, disparity, triangle, stale)
                 continue
             count = _clip(view, nearest, clipped)
-            for k in range(count):
-                d = 1.0 / clipped[k, 2]
-                clipped[k, 0] = (clipped[k, 0] * d + 1.0) * half
-                clipped[k, 1] = (clipped[k, 1] * d + 1.0) * half
-                clipped[k, 2] = d
+            _project(clipped, count, half)
             for k in range(1, count - 1):
                 corner[0], corner[1], corner[2] = clipped[0], clipped[k], clipped[k + 1]
-                _fill(corner, drop, t, disparity, triangle, stale)
+                _fill(corner, slopes, drop, t, batch, cutouts, disparity, triangle, stale)
+
+
+@njit(cache=True)
+def _project(corners: Any, count: int, half: float) -> None:
+    """Turn right, down, forward into column, row, disparity, and scale the rest by disparity."""
+    for k in range(count):
+        d = 1.0 / corners[k, 2]
+        corners[k, 0] = (corners[k, 0] * d + 1.0) * half
+        corners[k, 1] = (corners[k, 1] * d + 1.0) * half
+        corners[k, 2] = d
+        for a in range(3, 6):
+            corners[k, a] *= d
 
 
 @njit(cache=True)
@@ -137,7 +162,7 @@ def _clip(view: Any, nearest: float, out: Any) -> int:
             count += 1
         if zi * zj < 0.0:
             t = zi / (zi - zj)
-            for a in range(3):
+            for a in range(6):
                 out[count, a] = view[i, a] + t * (view[j, a] - view[i, a])
             out[count, 2] = nearest
             count += 1
@@ -145,8 +170,21 @@ def _clip(view: Any, nearest: float, out: Any) -> int:
 
 
 @njit(cache=True)
-def _fill(c: Any, one_sided: bool, t: int, disparity: Any, triangle: Any, stale: Any) -> None:
-    """Draw triangle `t` with corners `c` (3, 3): column, row, disparity."""
+def _fill(
+    c: Any,
+    slopes: Any,
+    one_sided: bool,
+    t: int,
+    batch: int,
+    cutouts: Any,
+    disparity: Any,
+    triangle: Any,
+    stale: Any,
+) -> None:
+    """Draw triangle `t` with corners `c` (3, 6), see `draw_clusters`.
+
+    `slopes` (2, 4) is scratch: change of the last four along columns and rows.
+    """
     resolution = len(disparity)
     low, high = min(c[0, 1], c[1, 1], c[2, 1]), max(c[0, 1], c[1, 1], c[2, 1])
     top, bottom = np.ceil(low - 0.5), np.floor(high - 0.5)
@@ -155,24 +193,19 @@ def _fill(c: Any, one_sided: bool, t: int, disparity: Any, triangle: Any, stale:
     low, high = min(c[0, 0], c[1, 0], c[2, 0]), max(c[0, 0], c[1, 0], c[2, 0])
     if np.floor(high - 0.5) < np.ceil(low - 0.5):
         return
-    x1, y1, d1 = c[1, 0] - c[0, 0], c[1, 1] - c[0, 1], c[1, 2] - c[0, 2]
-    x2, y2, d2 = c[2, 0] - c[0, 0], c[2, 1] - c[0, 1], c[2, 2] - c[0, 2]
+    x1, y1, x2, y2 = c[1, 0] - c[0, 0], c[1, 1] - c[0, 1], c[2, 0] - c[0, 0], c[2, 1] - c[0, 1]
     area = x1 * y2 - x2 * y1
     # rows run down, so a front face, counter-clockwise seen from the eye, has a negative area
     if area == 0.0 or (one_sided and area > 0.0):
         return
-    dx, dy = (d1 * y2 - d2 * y1) / area, (d2 * x1 - d1 * x2) / area
+    for a in range(1 if cutouts is None else 4):
+        d1, d2 = c[1, a + 2] - c[0, a + 2], c[2, a + 2] - c[0, a + 2]
+        slopes[0, a], slopes[1, a] = (d1 * y2 - d2 * y1) / area, (d2 * x1 - d1 * x2) / area
+    dx, dy = slopes[0, 0], slopes[1, 0]
     least, most = min(c[0, 2], c[1, 2], c[2, 2]), max(c[0, 2], c[1, 2], c[2, 2])
     for row in range(int(max(top, 0.0)), int(min(bottom, resolution - 1.0)) + 1):
         y = row + 0.5
-        left, right = np.inf, -np.inf
-        for i in range(3):
-            j = (i + 1) % 3
-            # always from the upper corner down: neighbours then agree about their common edge
-            a, b = (i, j) if c[i, 1] < c[j, 1] else (j, i)
-            if c[a, 1] <= y <= c[b, 1] and c[a, 1] < c[b, 1]:
-                x = c[a, 0] + (y - c[a, 1]) / (c[b, 1] - c[a, 1]) * (c[b, 0] - c[a, 0])
-                left, right = min(left, x), max(right, x)
+        left, right = _span(c, y)
         if not right >= 0.0 or left >= resolution:
             continue
         first = int(np.ceil(max(left, 0.0) - 0.5))
@@ -183,9 +216,50 @@ def _fill(c: Any, one_sided: bool, t: int, disparity: Any, triangle: Any, stale:
             # slivers have no slope worth the name: keep to what the corners have
             d = np.float32(min(max(base + column * dx, least), most))
             if d > disparity[row, column]:
+                if cutouts is not None:  # noqa: SIM102 - numba drops this branch as it stands
+                    if not _drawn(c, slopes, batch, cutouts, column, row):
+                        continue
                 disparity[row, column] = d
                 triangle[row, column] = t
                 drawn = True
         if drawn:
             for tile in range(first // TILE, last // TILE + 1):
                 stale[row // TILE, tile] = True
+
+
+@njit(cache=True, inline="always")
+def _span(c: Any, y: float) -> tuple[float, float]:
+    """Where the middle `y` of a row of texels enters and leaves a triangle with corners `c`."""
+    left, right = np.inf, -np.inf
+    for i in range(3):
+        j = (i + 1) % 3
+        # always from the upper corner down: neighbours then agree about their common edge
+        a, b = (i, j) if c[i, 1] < c[j, 1] else (j, i)
+        if c[a, 1] <= y <= c[b, 1] and c[a, 1] < c[b, 1]:
+            x = c[a, 0] + (y - c[a, 1]) / (c[b, 1] - c[a, 1]) * (c[b, 0] - c[a, 0])
+            left, right = min(left, x), max(right, x)
+    return left, right
+
+
+@njit(cache=True, inline="always")
+def _drawn(c: Any, slopes: Any, batch: int, cutouts: Any, column: int, row: int) -> bool:
+    """Whether a triangle with corners `c` (3, 6) is opaque enough at a texel."""
+    x, y = column + 0.5 - c[0, 0], row + 0.5 - c[0, 1]
+    z = 1.0 / (c[0, 2] + x * slopes[0, 0] + y * slopes[1, 0])
+    u = (c[0, 3] + x * slopes[0, 1] + y * slopes[1, 1]) * z
+    v = (c[0, 4] + x * slopes[0, 2] + y * slopes[1, 2]) * z
+    alpha = (c[0, 5] + x * slopes[0, 3] + y * slopes[1, 3]) * z
+    texture = cutouts.texture[batch]
+    if texture >= 0:
+        steps = 0.0
+        for k in range(2):
+            du = (slopes[k, 1] - u * slopes[k, 0]) * z * cutouts.sizes[texture, 0, 0]
+            dv = (slopes[k, 2] - v * slopes[k, 0]) * z * cutouts.sizes[texture, 0, 1]
+            steps = max(steps, du * du + dv * dv)
+        lod = 0.5 * np.log2(steps) if steps > 1.0 else 0.0
+        alpha *= opacity(cutouts, texture, u, v, lod)
+    if cutouts.kind[batch] == DITHER:
+        drawn = dithered(alpha, column, row)
+    else:
+        drawn = alpha >= cutouts.cutoff[batch]
+    return bool(drawn)
