@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 _REDIS_ERRORS = (OperationalError, RedisError, ConnectionError, TimeoutError)
 
 #: seconds between lists of a bake's cells, and how much longer than a list takes that has to be
-_LIST, _LIST_SHARE = 5.0, 20
+_LIST, _LIST_SHARE = 5.0, 5
 #: cells taken in, and cells sent, in one go
 _PORTION, _SENT_AT_ONCE = 1000, 10
 #: seconds between looks into a queue that is not empty
