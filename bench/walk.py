@@ -7,9 +7,9 @@ The second is the paper's figures 8 and 9 (bench/walk_path.py). Headless Chromiu
 own GL, one `readPixels` fence a frame. Frames that are compared are drawn in turn in one page
 (`growth`: in two pages), the best of three from each place; ratios are medians. The full model is
 drawn by three.js with the walk's own light, its triangles merged per material in 16, 64 or 256
-chunks that the frustum culls; the fastest of these counts. Figures that end in `processor` count
-processor time of the page and of the graphics process instead of the clock: on a busy machine they
-are the ones to believe. `--quick` is a small version of everything, for tests.
+chunks that the frustum culls; the fastest of these counts. Figures named `processor` count the
+processor time of the page and of the graphics process instead of the clock: on a busy machine
+believe those. `--quick` is a small version of everything, for tests.
 """
 
 from __future__ import annotations

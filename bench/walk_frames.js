@@ -50,9 +50,9 @@ window.bench = {
 
   /**
    * Follow `poses` from place `at` on for so many frames, as a walker does who waits for cells that
-   * have not come. What each frame took, showed and held.
+   * have not come. What each frame took, showed and held; with `both` also the full model's time.
    */
-  async follow(poses, at, frames) {
+  async follow(poses, at, frames, both = false) {
     const { session } = farfield;
     const { walk } = session;
     session.stop();
@@ -61,9 +61,11 @@ window.bench = {
       const busy = !walk.idle || walk.stats.uploads > 0;
       const ms = bench.frame('walk', poses[at]);
       const { stats } = walk;
+      const full = both ? bench.frame('full', poses[at]) : undefined;
       log.push({
         at,
         ms,
+        full,
         busy,
         cell: stats.cell,
         wanted: walk.wanted?.cell.name,

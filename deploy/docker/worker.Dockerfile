@@ -18,7 +18,8 @@ RUN apt-get update && apt-get install -y --no-install-recommends libegl1 libgl1 
     && rm -rf /var/lib/apt/lists/*
 # Tells glvnd of NVIDIA's EGL, whose library the container runtime mounts.
 COPY deploy/docker/10_nvidia.json /usr/share/glvnd/egl_vendor.d/10_nvidia.json
-RUN useradd --uid 10001 --create-home farfield && install -d -o farfield -g farfield /store
+RUN useradd --uid 10001 --create-home farfield \
+    && install -d -o farfield -g farfield /store /var/cache/farfield
 COPY --from=packages /opt/farfield /opt/farfield
 ENV PATH=/opt/farfield/bin:$PATH \
     PYTHONUNBUFFERED=1 \

@@ -97,8 +97,11 @@ def test_front_page(browser: Browser, server: WalkServer, tmp_path: Path) -> Non
     page.goto(f"{server.url}/")
     page.get_by_text("nothing to walk through yet").wait_for()
     keep(page, tmp_path, "front-empty")
-    bakes = '[{"id": "b1", "name": "Lake city", "cells": {"done": 3, "total": 12}}]'
-    page.route("**/api/v1/bakes", lambda route: route.fulfill(status=200, body=bakes))
+    bakes = (
+        '{"bakes": [{"id": "b1", "name": "Lake city", "scene": "s1",'
+        ' "cells": {"done": 3, "total": 12}}], "next": null}'
+    )
+    page.route("**/api/v1/bakes?*", lambda route: route.fulfill(status=200, body=bakes))
     page.reload()
     link = page.get_by_role("link", name="Lake city")
     assert link.get_attribute("href") == "walk/b1"

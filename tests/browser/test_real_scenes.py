@@ -1,9 +1,11 @@
 """The main job, end to end: real models baked by the command line, served, walked in Chromium.
 
 At each cell's centre the browser's picture must equal `farfield shoot` of the walk's files, and it
-is compared with a full render of the scene. Sizes are small unless FARFIELD_SOAK=1.
+is compared with a full render of the scene. From a corner of each cell it must show no crack where
+near polygons meet the far field. Sizes are small unless FARFIELD_SOAK=1.
 """
 
+import itertools
 import json
 import math
 import os
@@ -26,7 +28,9 @@ from farfield_core.walk import CellFile, Walk
 from farfield_worker.shoot.scene import SceneShooter
 from farfield_worker.shoot.view import NearField, Picture, View
 from farfield_worker.shoot.walk import WalkShooter
+from farfield_worker.verify.border import border
 from farfield_worker.verify.metrics import Shot, compare, eroded, unmatched
+from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import BrowserContext
 
@@ -36,6 +40,8 @@ from tests.corridors.scenes import DATA, SCENES, Scene
 SOAK = os.environ.get("FARFIELD_SOAK") == "1"
 RESOLUTION, LAYERS, CELLS = (512, 64, 4) if SOAK else (256, 24, 2)
 SIZE = 512 if SOAK else 256
+#: looked from in turn, as shares of half a cell
+CORNERS = tuple(itertools.product((1, -1), repeat=3))
 ROOT = Path(__file__).parents[2]
 RESULTS, PICTURES = ROOT / "bench" / "results", ROOT / "docs" / "pictures"
 
@@ -88,6 +94,23 @@ def shot(picture: Picture) -> Shot:
     return Shot(picture.rgba[..., :3], picture.rgba[..., 3] > 0, picture.far)
 
 
+def look_at_border(
+    cell: CellFile, walk: Walk, scenes: SceneShooter, visit: Visit
+) -> NDArray[np.int64]:
+    """Pixels at a cell's near border as its corners see it in the browser, and cracks there."""
+    found = np.zeros(2, np.int64)
+    half = 0.95 * np.array(walk.grid.size) / 2
+    for turn, corner in enumerate(CORNERS if SOAK else CORNERS[:1]):
+        x, y, z = (np.array(cell.eyes[0]) + half * corner).tolist()
+        yaw = walk.start.yaw + turn * math.pi / 2
+        visit.go_to(x, y, z, yaw, -0.1)
+        view = View((x, y, z), yaw, -0.1, 60.0, SIZE, 0.01 * min(walk.grid.size))
+        near_field = NearField(cell.eyes[0], walk.near_field)
+        seen = border(scenes, view, near_field, visit.pixels()[..., 3] > 0)
+        found += [int(seen.pixels.sum()), int(seen.cracks.sum())]
+    return found
+
+
 def look_over(scene: Scene, model: Path, folder: Path, visit: Visit, web: Path) -> None:
     """Bake, serve, stand in every cell, and hold the browser's picture against both others."""
     bake_folder = bake(scene, model, folder)
@@ -102,6 +125,7 @@ def look_over(scene: Scene, model: Path, folder: Path, visit: Visit, web: Path) 
     walks, scenes = WalkShooter(bake_folder), SceneShooter(prepared)
     clip = 0.01 * min(walk.grid.size)
     report = {}
+    found = np.zeros(2, np.int64)
     with served(folder / "out", web) as address:
         visit.page.set_viewport_size({"width": SIZE, "height": SIZE})
         visit.open(f"{address}/walk/{walk.id}?capture")
@@ -127,12 +151,16 @@ def look_over(scene: Scene, model: Path, folder: Path, visit: Visit, web: Path) 
                 }
                 sheet = np.concatenate([seen[..., :3], drawn.rgba[..., :3], full.rgb], axis=1)
                 Image.fromarray(sheet).save(folder / f"{name.replace(' ', '_')}.png")
+            found += look_at_border(cell, walk, scenes, visit)
     walks.close()
     scenes.close()
     if SOAK:
         RESULTS.mkdir(parents=True, exist_ok=True)
         text = json.dumps(report, indent=1)
         (RESULTS / f"real_scenes_{scene.name}.json").write_text(text + "\n", encoding="utf-8")
+    at_border, cracks = found
+    assert at_border > 0
+    assert cracks == 0
     for name, figures in report.items():
         assert figures["browser"]["wrong"] <= 1e-3, (name, figures)
         assert figures["browser"]["missing"] == 0, (name, figures)

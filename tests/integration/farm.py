@@ -53,14 +53,19 @@ class Farm:
         self._stack.close()
 
     def worker(
-        self, jobs: int = 2, env: dict[str, str] | None = None, **fake: Any
+        self,
+        jobs: int = 2,
+        env: dict[str, str] | None = None,
+        *,
+        wait: bool = True,
+        **fake: Any,
     ) -> subprocess.Popen[bytes]:
         """Start a worker; `fake` maps c<i>_<j>_<k>, and `*`, to what happens there (farm_cell)."""
-        return self._stack.enter_context(self._worker(jobs, env or {}, fake))
+        return self._stack.enter_context(self._worker(jobs, env or {}, wait, fake))
 
     @contextmanager
     def _worker(
-        self, jobs: int, env: dict[str, str], fake: dict[str, Any]
+        self, jobs: int, env: dict[str, str], wait: bool, fake: dict[str, Any]
     ) -> Iterator[subprocess.Popen[bytes]]:
         behaviour = json.dumps({name.removeprefix("c"): act for name, act in fake.items()})
         log = self._folder / f"worker-{time.monotonic_ns()}.log"
@@ -79,10 +84,10 @@ class Farm:
                 stderr=out,
                 start_new_session=True,
             )
-        process.log = log  # type: ignore[attr-defined]
         try:
-            until(lambda: b"ready." in log.read_bytes() or process.poll() is not None)
-            assert process.poll() is None, log.read_text()
+            if wait:
+                until(lambda: b"ready." in log.read_bytes() or process.poll() is not None)
+                assert process.poll() is None, log.read_text()
             yield process
         finally:
             kill(process)

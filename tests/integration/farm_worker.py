@@ -1,4 +1,4 @@
-"""A farm worker whose cells and scenes are made by stand-ins: `farm_worker.py BROKER STORE [JOBS]`."""
+"""A farm worker with stand-ins for cells and scenes: `farm_worker.py BROKER STORE [JOBS]`."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""Servers that tests start, kill and let fail: Redis, an S3 gateway, and a proxy that injects faults."""
+"""Servers that tests start and kill: Redis, an S3 gateway, and a proxy that injects faults."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import shutil
 import signal
 import socket
 import subprocess
+import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -87,14 +87,14 @@ def versitygw() -> str | None:
 
 
 class S3Server(Server):
-    """An S3 server over a folder: versitygw, or moto where there is none."""
+    """An S3 server over a folder: versitygw."""
 
     def __init__(self, folder: Path) -> None:
         self.port = free_port()
         self.endpoint = f"http://127.0.0.1:{self.port}"
         (folder / BUCKET).mkdir(parents=True, exist_ok=True)
         gateway = versitygw()
-        assert gateway, "versitygw is needed; make setup builds it where Go is installed"
+        assert gateway, "versitygw is needed"
         address = ["--port", f"127.0.0.1:{self.port}", "--health", "/health"]
         keys = {"ROOT_ACCESS_KEY": "key", "ROOT_SECRET_KEY": "a secret of tests"}
         super().__init__([gateway, *address, "posix", str(folder)], keys)
@@ -109,6 +109,31 @@ class S3Server(Server):
             connection.request("GET", "/health")
             return connection.getresponse().status == 200
         return False
+
+
+class MotoServer(Server):
+    """An S3 server in memory; it checks no signatures, and forgets all when it is killed."""
+
+    def __init__(self) -> None:
+        self.port = free_port()
+        self.endpoint = f"http://127.0.0.1:{self.port}"
+        super().__init__([sys.executable, "-m", "moto.server", "-p", str(self.port)])
+
+    def start(self) -> None:
+        super().start()
+        until(self._has_bucket)
+
+    def _has_bucket(self) -> bool:
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=5)
+        with suppress(OSError):
+            connection.request("PUT", f"/{BUCKET}")
+            return connection.getresponse().status == 200
+        return False
+
+
+def s3_server(folder: Path) -> S3Server | MotoServer:
+    """The real one, or moto where Go is not installed."""
+    return S3Server(folder) if versitygw() else MotoServer()
 
 
 def s3_environment(endpoint: str) -> dict[str, str]:
@@ -175,7 +200,8 @@ class Faults:
                 if self.command != "HEAD":
                     self.wfile.write(body)
 
-            do_GET = do_PUT = do_HEAD = do_DELETE = do_POST = handle_any
+        for method in ("GET", "PUT", "HEAD", "DELETE", "POST"):
+            setattr(Handler, f"do_{method}", Handler.handle_any)
 
         class Proxy(ThreadingHTTPServer):
             daemon_threads = True

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from farfield_api.app import create_app
+from farfield_api.observe import Tracing
 from farfield_api.service import FarfieldService
 from farfield_api.settings import ApiSettings
 from farfield_core.dispatch.local import LocalDispatcher
@@ -23,20 +24,29 @@ PREPARE = (sys.executable, str(TESTS / "integration/fake_prepare.py"))
 API = "/api/v1"
 
 
-def app_over(folder: Path, jobs: int = 1, web: Path | None = None, **fake: Any) -> FastAPI:
+def app_over(
+    folder: Path,
+    jobs: int = 1,
+    web: Path | None = None,
+    settings: dict[str, Any] | None = None,
+    tracing: Tracing | None = None,
+    **fake: Any,
+) -> FastAPI:
     """The application; `fake` maps c<i>_<j>_<k> to what happens there (fake_executor)."""
-    settings = ApiSettings(store=str(folder), web=web or folder / "no-pages", upload_limit=100_000)
+    given = ApiSettings(
+        store=str(folder), web=web or folder / "no-pages", upload_limit=100_000, **settings or {}
+    )
     store = Store.open(folder)
     behaviour = {"FAKE": json.dumps({k.removeprefix("c"): v for k, v in fake.items()})}
     service = FarfieldService(
-        settings,
+        given,
         store,
         lambda listener: LocalDispatcher(
             store, jobs, listener, command=CELL, environment=behaviour
         ),
         ScenePreparer(store, PREPARE),
     )
-    return create_app(settings, service)
+    return create_app(given, service, tracing)
 
 
 @contextmanager

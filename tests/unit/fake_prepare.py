@@ -1,6 +1,7 @@
 """Stands in for `farfield_worker prepare`; what it does is the first word of the model file."""
 
 import json
+import resource
 import sys
 import time
 from pathlib import Path
@@ -17,6 +18,10 @@ def main() -> int:
     if act == "crash":
         print("out of memory", file=sys.stderr)
         return 9
+    if act == "spin":
+        resource.setrlimit(resource.RLIMIT_CPU, (int(argument["--cpu-seconds"]), 60))
+        while True:
+            pass
     if act == "hang":
         time.sleep(3600)
     out.mkdir(parents=True)

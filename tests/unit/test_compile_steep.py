@@ -41,7 +41,8 @@ def expected_fill(face, layers, resolution, rings):
     out = np.zeros((layers, resolution, resolution), bool)
     around = range(-rings, rings + 1)
     for q, here in fragments.items():
-        for p in ((q[0] + down, q[1] + across) for down in around for across in around):
+        beside = [(q[0] + n, q[1]) for n in around] + [(q[0], q[1] + n) for n in around]
+        for p in beside:
             for j, b in here:
                 for i, a in fragments.get(p, ()):
                     if j - REACH <= i < j - 1 and goes_on(fragments, p, q, a, b):

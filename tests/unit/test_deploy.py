@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from farfield_worker.farm.bakers import Limits
 
 ROOT = Path(__file__).parents[2]
 COMPOSE = ROOT / "docker-compose.yml"
+GPU = ROOT / "docker-compose.gpu.yml"
 DOCKERFILES = sorted((ROOT / "deploy/docker").glob("*.Dockerfile"))
 
 
@@ -28,11 +30,15 @@ def instructions(dockerfile: Path) -> list[tuple[str, str]]:
     return [(line.split()[0], line.split(maxsplit=1)[1]) for line in lines if line.strip()]
 
 
-def compose() -> dict[str, Any]:
+def load(path: Path) -> dict[str, Any]:
     from ruamel.yaml import YAML  # check-jsonschema's own reader
 
-    loaded: dict[str, Any] = YAML(typ="safe").load(COMPOSE)
+    loaded: dict[str, Any] = YAML(typ="safe").load(path)
     return loaded
+
+
+def compose() -> dict[str, Any]:
+    return load(COMPOSE)
 
 
 def test_compose_file_is_accepted() -> None:
@@ -48,12 +54,33 @@ def test_a_wrong_compose_file_is_not_accepted(tmp_path: Path) -> None:
 
 def test_compose_builds_from_dockerfiles_that_exist() -> None:
     services = compose()["services"]
-    assert set(services) == {"redis", "api", "worker"}
-    for name in ("api", "worker"):
+    assert set(services) == {"redis", "s3", "api", "worker"}
+    for name in ("s3", "api", "worker"):
         build = services[name]["build"]
         assert (ROOT / build["context"] / build["dockerfile"]).is_file()
-        assert services[name]["environment"]["FARFIELD_BROKER"].startswith("redis://redis:")
-        assert "store:/store" in services[name]["volumes"]
+
+
+def test_api_and_workers_share_store_and_broker() -> None:
+    services = compose()["services"]
+    shared = ("FARFIELD_STORE", "FARFIELD_BROKER", "AWS_ENDPOINT_URL", "AWS_SECRET_ACCESS_KEY")
+    api, worker = services["api"]["environment"], services["worker"]["environment"]
+    assert [api[name] for name in shared] == [worker[name] for name in shared]
+    assert api["FARFIELD_BROKER"].startswith("redis://redis:")
+    bucket = api["FARFIELD_STORE"].removeprefix("s3://").split("/")[0]
+    assert services["s3"]["volumes"] == [f"store:/data/{bucket}"]
+    assert services["s3"]["environment"]["ROOT_SECRET_KEY"] == api["AWS_SECRET_ACCESS_KEY"]
+
+
+def test_a_worker_is_given_the_time_that_a_cell_may_take() -> None:
+    grace = compose()["services"]["worker"]["stop_grace_period"]
+    assert 60 * int(grace.removesuffix("m")) > Limits().seconds
+
+
+def test_the_gpu_file_fits_the_compose_file() -> None:
+    assert validate(GPU) == 0
+    changed = load(GPU)["services"]
+    assert set(changed) < set(compose()["services"])
+    assert {s["environment"]["FARFIELD_DEVICE"] for s in changed.values()} == {"gpu"}
 
 
 def test_compose_publishes_on_loopback_only() -> None:
@@ -98,7 +125,8 @@ def test_what_images_copy_is_not_ignored() -> None:
 
 def test_only_the_worker_knows_gl() -> None:
     texts = {path.name: path.read_text(encoding="utf-8") for path in DOCKERFILES}
-    assert set(texts) == {"api.Dockerfile", "worker.Dockerfile"}
+    assert set(texts) == {"api.Dockerfile", "worker.Dockerfile", "s3.Dockerfile"}
+    assert "libegl" not in texts["s3.Dockerfile"]
     assert "libegl" not in texts["api.Dockerfile"]
     assert "graphics" in texts["worker.Dockerfile"]
     assert "10_nvidia.json" in texts["worker.Dockerfile"]

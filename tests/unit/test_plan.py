@@ -2,14 +2,16 @@
 
 import time
 
+import numpy as np
 import pytest
 from farfield_core.bake import create_bake
 from farfield_core.corridor import parse_corridor
 from farfield_core.errors import BadInputError
-from farfield_core.plan import Plan, plan
+from farfield_core.plan import Plan, near_triangles, plan
 from farfield_core.settings import BakeSettings
 from farfield_core.store import Store
 
+from tests.unit.soup import soup
 from tests.unit.walks import scene_info
 
 CORRIDORS = {
@@ -85,3 +87,30 @@ def test_what_cannot_be_baked_cannot_be_planned() -> None:
     corridor = parse_corridor({"box": {"min": [0, 0, 0], "max": [1e6, 1e6, 1e6]}})
     with pytest.raises(BadInputError):
         plan(scene_info(), corridor, BakeSettings())
+
+
+def test_near_triangles_are_estimated_from_blocks() -> None:
+    random = np.random.default_rng(6)
+    middles = random.uniform(-100, 100, (20_000, 1, 3)) * (1, 0.05, 1)
+    corners = middles + random.normal(0, 0.2, (20_000, 3, 3))
+    # blocks are compact, as preparation makes them
+    order = np.lexsort(((middles[:, 0, 2] // 10), (middles[:, 0, 0] // 10)))
+    scene = soup(corners[order], origin=(30.0, 0.0, -40.0), blocks=400)
+    centres = random.uniform(-60, 60, (20, 3)) * (1, 0.02, 1)
+    guessed = near_triangles(scene.info, centres, 25.0)
+    inside = np.abs(corners[None] - centres[:, None, None]).max(axis=-1).min(axis=-1) <= 25.0
+    np.testing.assert_allclose(guessed, inside.sum(axis=1), rtol=0.15)
+
+
+def test_a_plan_tells_what_visibility_leaves() -> None:
+    random = np.random.default_rng(1)
+    scene = soup(random.uniform(-50, 50, (3000, 1, 3)) + random.normal(0, 1, (3000, 3, 3))).info
+    corridor = parse_corridor(CORRIDORS["path"])
+    off = plan(scene, corridor, BakeSettings(visibility="off"))
+    on = plan(scene, corridor, BakeSettings())
+    assert on.before == off.before
+    for name, value in off.before.items():
+        assert getattr(off, name) == value > 0
+        assert getattr(on, name) < value
+    assert on.most_near_triangles >= on.near_triangles
+    assert on.megabytes < off.megabytes

@@ -8,7 +8,12 @@ from pathlib import Path
 
 import pytest
 from farfield_core import scenes, sources
-from farfield_core.dispatch.prepare import ScenePreparer, forget_scene, prepare_scene
+from farfield_core.dispatch.prepare import (
+    PrepareLimits,
+    ScenePreparer,
+    forget_scene,
+    prepare_scene,
+)
 from farfield_core.errors import FarfieldError, NotFoundError, SceneRefusedError
 from farfield_core.store import Store
 
@@ -195,3 +200,49 @@ def test_closing_stops_what_is_being_prepared(store: Store, tmp_path: Path) -> N
     preparer.close()
     assert time.monotonic() - began < 10
     assert scenes.scene_state(store, scene).state == "uploaded"
+
+
+@pytest.mark.parametrize(
+    ("act", "limits", "word"),
+    [
+        ("hang", PrepareLimits(wall_seconds=1), "more than 1 s, which"),
+        ("spin", PrepareLimits(cpu_seconds=1), "1 s of processor time"),
+    ],
+)
+def test_a_preparation_that_takes_too_long_refuses_the_scene(
+    tmp_path: Path, act: str, limits: PrepareLimits, word: str
+) -> None:
+    store = Store.open(tmp_path / "store")
+    scene = scenes.import_source(store, model(tmp_path, act))
+    with pytest.raises(SceneRefusedError, match=word):
+        prepare_scene(store, scene, FAKE, limits=limits)
+    state = scenes.scene_state(store, scene)
+    assert state.state == "refused"
+    assert word in (state.reason or "")
+
+
+def test_the_same_model_turned_is_another_scene(tmp_path: Path) -> None:
+    store = Store.open(tmp_path / "store")
+    scene = scenes.import_source(store, model(tmp_path, "fine"))
+    tipped = scenes.Orientation(up="z", scale=0.01)
+    turned = scenes.reorient(store, scene, tipped)
+    assert turned != scene
+    assert scenes.reorient(store, scene, tipped) == turned
+    assert scenes.orientation(store, turned) == tipped
+    assert scenes.orientation(store, scene) == scenes.Orientation()
+    # from the turned one, relative to the model itself
+    assert scenes.reorient(store, turned, scenes.Orientation()) == scene
+    assert scenes.reorient(store, turned, tipped) == turned
+    assert scenes.scene_state(store, turned).state == "uploaded"
+    with pytest.raises(NotFoundError):
+        scenes.reorient(store, "none", tipped)
+
+
+def test_what_is_ours_is_linked_and_what_is_not_is_copied(tmp_path: Path) -> None:
+    store = Store.open(tmp_path / "store")
+    theirs, ours = model(tmp_path, "theirs"), model(tmp_path, "ours", name="ours.stl")
+    for path, owned, links in ((theirs, False, 1), (ours, True, 2)):
+        scene = scenes.import_source(store, path, owned=owned)
+        kept = store.local_path(f"scenes/{scene}/source/{path.name}")
+        assert kept is not None
+        assert kept.stat().st_nlink == links

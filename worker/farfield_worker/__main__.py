@@ -9,6 +9,7 @@ import sys
 COMMANDS = {
     "prepare": "farfield_worker.prepare.command",
     "cell": "farfield_worker.cell.command",
+    "probe": "farfield_worker.probe",
 }
 
 

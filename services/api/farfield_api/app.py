@@ -19,12 +19,23 @@ from fastapi.routing import APIRoute
 from starlette.types import Scope
 
 from farfield_api import __version__, exceptions, pages
-from farfield_api.auth import Auth
+from farfield_api.auth import Auth, OwnPages
 from farfield_api.idempotency import Idempotency
 from farfield_api.keys import Keys
 from farfield_api.limits import BodyLimit
 from farfield_api.observe import Metrics, Observe, Tracing, cell_listener
-from farfield_api.routers import bakes, events, health, keys, plans, scenes, tus, uploads, walks
+from farfield_api.routers import (
+    bakes,
+    events,
+    farm,
+    health,
+    keys,
+    plans,
+    scenes,
+    tus,
+    uploads,
+    walks,
+)
 from farfield_api.routers.tus import TusHeaders
 from farfield_api.service import FarfieldService
 from farfield_api.settings import ApiSettings
@@ -69,8 +80,13 @@ def create_service(settings: ApiSettings) -> FarfieldService:
     return FarfieldService(settings, store, local, preparer)
 
 
-def create_app(settings: ApiSettings, service: FarfieldService | None = None) -> FastAPI:
-    """Build the application; `service` is made from `settings` unless given."""
+def create_app(
+    settings: ApiSettings,
+    service: FarfieldService | None = None,
+    tracing: Tracing | None = None,
+) -> FastAPI:
+    """Build the application; `service` and `tracing` are made from `settings` unless given."""
+    metrics, tracing = Metrics(), tracing or Tracing(settings.traces)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -100,12 +116,12 @@ def create_app(settings: ApiSettings, service: FarfieldService | None = None) ->
         redoc_url=None,
         generate_unique_id_function=_operation,
     )
-    metrics, tracing = Metrics(), Tracing(settings.traces)
     app.state.metrics, app.state.tracing = metrics, tracing
     # Each is inside the ones that are added after it.
     app.add_middleware(GZipMiddleware, minimum_size=1000, compresslevel=6)
     app.add_middleware(Idempotency)
     app.add_middleware(TusHeaders, prefix=f"{PREFIX}/uploads")
+    app.add_middleware(OwnPages, origins=settings.origins)
     if settings.needs_keys:
         app.add_middleware(Auth, prefix=PREFIX, keys=_keys, rate=settings.rate)
     app.add_middleware(
@@ -128,7 +144,7 @@ def create_app(settings: ApiSettings, service: FarfieldService | None = None) ->
         )
     app.add_middleware(Observe, metrics=metrics, tracing=tracing)
     exceptions.install(app)
-    for module in (health, scenes, uploads, tus, plans, bakes, events, walks, keys):
+    for module in (health, scenes, uploads, tus, plans, bakes, events, walks, farm, keys):
         app.include_router(module.router, prefix=PREFIX)
     app.include_router(health.metrics_router)
     pages.install(app, settings.web)

@@ -6,7 +6,7 @@ import re
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from http import HTTPStatus
 
 from fastapi.concurrency import run_in_threadpool
@@ -91,6 +91,29 @@ class Auth:
             await self._app(scope, receive, send)
             return
         await answer(scope, receive, send)
+
+
+class OwnPages:
+    """ASGI middleware: pages of other sites change nothing, unless their origins are allowed.
+
+    A server on loopback asks for no key, and a page of any site could post a form to it. Browsers
+    say where a request comes from (Sec-Fetch-Site); programs do not, and need not.
+    """
+
+    def __init__(self, app: ASGIApp, origins: Sequence[str]) -> None:
+        self._app = app
+        self._origins = frozenset(origins)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        if scope["type"] == "http" and scope["method"] not in ("GET", "HEAD", "OPTIONS"):
+            headers = HTTPConnection(scope).headers
+            allowed = "*" in self._origins or headers.get("origin") in self._origins
+            if headers.get("sec-fetch-site") == "cross-site" and not allowed:
+                sentence = "Pages of other sites may change nothing here; see FARFIELD_CORS."
+                await problem(HTTPStatus.FORBIDDEN, sentence)(scope, receive, send)
+                return
+        await self._app(scope, receive, send)
 
 
 def shown(connection: HTTPConnection) -> str:

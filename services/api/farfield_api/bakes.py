@@ -92,6 +92,11 @@ class Bakes:
             lambda bake: walk_grid(store, self.walk(bake))
         )
 
+    @property
+    def dispatcher(self) -> Dispatcher:
+        """Who bakes."""
+        return self._dispatcher
+
     def ids(self) -> list[str]:
         """All bakes, those asked for first coming first; those never asked for come last."""
         return [key.rpartition(" ")[2] for key in self.order()]

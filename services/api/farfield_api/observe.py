@@ -211,7 +211,7 @@ class Observe:
 
 
 def _route(scope: Scope) -> str:
-    """The route that answered, "other" where none did."""
+    """The route that answered, below the API's prefix; "other" where none did."""
     return str(getattr(scope.get("route"), "path", "") or "other")
 
 

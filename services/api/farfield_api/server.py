@@ -8,6 +8,7 @@ import socket
 import uvicorn
 
 from farfield_api.app import create_app_from_environment
+from farfield_api.observe import log_to_stderr
 
 
 class Server(uvicorn.Server):
@@ -27,11 +28,15 @@ class Server(uvicorn.Server):
 
 def main() -> None:
     """Serve on FARFIELD_HOST and FARFIELD_PORT: what an image runs."""
+    log_to_stderr("json" if os.environ.get("FARFIELD_LOGS") == "json" else "text")
     config = uvicorn.Config(
         create_app_from_environment(),
         host=os.environ.get("FARFIELD_HOST", "127.0.0.1"),
         port=int(os.environ.get("FARFIELD_PORT", "8000")),
         timeout_graceful_shutdown=10,
+        # ours says the same, with ids
+        access_log=False,
+        log_config=None,
     )
     Server(config).run()
 

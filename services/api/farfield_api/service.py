@@ -11,7 +11,7 @@ from pathlib import Path
 from farfield_core import scenes as core_scenes
 from farfield_core.bake import create_bake
 from farfield_core.corridor import Corridor, Ground, parse_corridor
-from farfield_core.dispatch import Dispatcher, Listener
+from farfield_core.dispatch import Dispatcher, FarmView, Listener
 from farfield_core.errors import BadInputError, NotFoundError
 from farfield_core.ground import ground_under
 from farfield_core.plan import plan
@@ -53,6 +53,12 @@ class FarfieldService:
         self.bakes = Bakes(store, dispatcher)
         self.packed = PackedObjects(store)
         self.suggestion = lru_cache(maxsize=64)(self._suggest)
+
+    @property
+    def farm(self) -> FarmView | None:
+        """What is known of the farm's workers; None where this server bakes by itself."""
+        dispatcher = self.bakes.dispatcher
+        return dispatcher if isinstance(dispatcher, FarmView) else None
 
     def take_up(self) -> None:
         """Go on where the server before this one stopped."""

@@ -26,6 +26,7 @@ COMMANDS = {
     "bakes": "List the bakes of a server.",
     "watch": "Follow a bake of a server.",
     "keys": "Make, list and end the API keys of a store.",
+    "bake-object": "Bake one model as an object impostor.",
 }
 
 
@@ -40,7 +41,7 @@ class Commands(click.Group):
         """The command of that name."""
         if cmd_name not in COMMANDS:
             return None
-        command = importlib.import_module(f"farfield.commands.{cmd_name}").command
+        command = importlib.import_module(f"farfield.commands.{cmd_name.replace('-', '_')}").command
         assert isinstance(command, click.Command)
         return command
 

@@ -107,12 +107,13 @@ class CellProgress:
         """A cell is done."""
         self.update(self._done + 1)
 
-    def update(self, done: int) -> None:
-        """So many cells are done."""
+    def update(self, done: int, total: int | None = None) -> None:
+        """So many cells are done, of so many."""
         if done <= self._done:
             return
         self._done = done
-        self._bar.update(self._task, completed=done)
+        self._total = total or self._total
+        self._bar.update(self._task, completed=done, total=self._total)
         now = time.monotonic()
         last = self._done == self._total
         if not self._console.is_terminal and (last or now - self._said > LINE_EVERY):

@@ -236,6 +236,15 @@ describe('Walker on solid ground', () => {
     expect(walker.eye[1]).toBeCloseTo(high, 1);
   });
 
+  test('ground that comes to be known later pulls nobody down', () => {
+    const walker = at([5, 4, 5]);
+    for (let n = 0; n < 10; n++) walker.step(1 / 30, STILL, { index, brake: () => 1 });
+    walk(walker, solidOf(floor), 2, {});
+    expect(walker.eye[1]).toBeCloseTo(4, 6);
+    for (let n = 0; n < 10; n++) walker.step(1 / 30, STILL, { index, brake: () => 1 });
+    expect(walker.eye[1]).toBeCloseTo(4, 6);
+  });
+
   test('climbs steps, and is stopped by what is higher than a step', () => {
     const step: [Vec3, Vec3] = [
       [-20, 1, -20],
@@ -329,12 +338,12 @@ describe('Walker on solid ground', () => {
 
 describe('words', () => {
   test('the list of bakes is read whatever shape it comes in', () => {
-    const bake = { id: 'b', name: 'City', cells: { done: 2, total: 4 } };
-    const wanted = [{ id: 'b', name: 'City', progress: '2 of 4 cells' }];
+    const bake = { id: 'b', name: 'City', scene: 's', cells: { done: 2, total: 4 } };
+    const wanted = [{ id: 'b', name: 'City', scene: 's', progress: '2 of 4 cells' }];
     expect(readBakes([bake])).toEqual(wanted);
     expect(readBakes({ bakes: [bake] })).toEqual(wanted);
     expect(readBakes({ items: [bake, { name: 'no id' }, null, 3] })).toEqual(wanted);
-    expect(readBakes([{ id: 'b' }])).toEqual([{ id: 'b', name: 'b', progress: '' }]);
+    expect(readBakes([{ id: 'b' }])).toEqual([{ id: 'b', name: 'b', scene: '', progress: '' }]);
     expect(readBakes('nothing')).toEqual([]);
   });
 

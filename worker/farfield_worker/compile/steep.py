@@ -1,8 +1,9 @@
 """Gap filling for surfaces that skip layers, which the paper's rule (`gaps`) leaves open.
 
-Ground, water and walls seen at a slant may pass several layers from one texel p to its neighbour q,
-on layers i and j > i + 1. Layers shift against each other one by one, so every one of i ... j - 1
-gets a texel at q, in q's colour: any two neighbours in that ladder touch, from every eye.
+Ground, water and walls seen at a slant may pass several layers from one texel p to the next one of
+its row or column q, on layers i and j > i + 1. Layers shift against each other one by one, so every
+one of i ... j - 1 gets a texel at q, in q's colour: any two neighbours in that ladder touch, from
+every eye.
 
 But most jumps are silhouettes, where nothing should be filled. They are told apart by disparity,
 which on any plane is affine in the face's coordinates: the line through p and q, continued by as
@@ -55,41 +56,38 @@ def _mark(starts: Any, layer: Any, disparity: Any, closed: Any, out: Any, rings:
             if not open_:
                 continue
             lowest = j  # the farthest layer that this fragment is continued on
-            for other_row in range(max(row - rings, 0), min(row + rings + 1, resolution)):
-                for other_column in range(
-                    max(column - rings, 0), min(column + rings + 1, resolution)
-                ):
-                    p = other_row * resolution + other_column
-                    down, across = row - other_row, column - other_column
-                    for n in range(starts[p], starts[p + 1]):
-                        i = layer[n]
-                        if i >= min(lowest, j - 1):
-                            break
-                        if i < j - REACH:
-                            continue
-                        step = disparity[at] - disparity[n]
-                        behind = _off(
-                            starts,
-                            disparity,
-                            resolution,
-                            other_row - down,
-                            other_column - across,
-                            disparity[n] - step,
-                        )
-                        before = _off(
-                            starts,
-                            disparity,
-                            resolution,
-                            row + down,
-                            column + across,
-                            disparity[at] + step,
-                        )
-                        if (
-                            max(behind, before) <= IN_LINE * step
-                            or min(behind, before) <= EXACT * step
-                        ):
-                            lowest = i
-                            break
+            for side in range(4 * rings):
+                reach = side // 4 + 1
+                down, across = ((reach, 0), (-reach, 0), (0, reach), (0, -reach))[side % 4]
+                if not (0 <= row - down < resolution and 0 <= column - across < resolution):
+                    continue
+                p = q - down * resolution - across
+                for n in range(starts[p], starts[p + 1]):
+                    i = layer[n]
+                    if i >= min(lowest, j - 1):
+                        break
+                    if i < j - REACH:
+                        continue
+                    step = disparity[at] - disparity[n]
+                    behind = _off(
+                        starts,
+                        disparity,
+                        resolution,
+                        row - 2 * down,
+                        column - 2 * across,
+                        disparity[n] - step,
+                    )
+                    before = _off(
+                        starts,
+                        disparity,
+                        resolution,
+                        row + down,
+                        column + across,
+                        disparity[at] + step,
+                    )
+                    if max(behind, before) <= IN_LINE * step or min(behind, before) <= EXACT * step:
+                        lowest = i
+                        break
             for i in range(lowest, min(j, layers)):
                 if closed[i, row, word] & bit == 0:
                     out[i, row, word] |= bit

@@ -15,7 +15,7 @@ from typing import Any
 
 from celery import Celery, Task, signals
 from farfield_core import scenes
-from farfield_core.dispatch.board import Board, Slot
+from farfield_core.dispatch.board import Board
 from farfield_core.dispatch.celery_prepare import PREPARING
 from farfield_core.dispatch.executor import COMMAND
 from farfield_core.dispatch.prepare import prepare_scene
@@ -30,6 +30,7 @@ from farfield_core.dispatch.queues import (
     cell_queues,
     served_queues,
 )
+from farfield_core.dispatch.slots import Slot
 from farfield_core.errors import FarfieldError, SceneRefusedError
 from farfield_core.store import Store
 

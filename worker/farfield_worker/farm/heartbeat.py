@@ -14,7 +14,8 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 
-from farfield_core.dispatch.board import BEAT, Board, Orders, Report, Slot
+from farfield_core.dispatch.board import BEAT, Board, Orders, Report
+from farfield_core.dispatch.slots import Slot
 from redis.exceptions import RedisError
 
 log = logging.getLogger(__name__)

@@ -26,9 +26,11 @@ READERS = {
 #: what parsers raise on damaged data; the sizes that cost memory are checked before
 _DAMAGE = (
     ArithmeticError,
+    AssertionError,
     AttributeError,
     EOFError,
     LookupError,
+    NameError,  # trimesh, where a PLY's faces are called otherwise
     OSError,
     RecursionError,
     RuntimeError,

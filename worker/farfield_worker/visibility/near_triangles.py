@@ -1,10 +1,10 @@
 """Which near triangles the eyes of a view cell can see.
 
-A triangle counts as seen if it shows in a near map, or if one of four points on it (its middle, and
-close to its corners) has nothing solid before it, in its map's texel or in one of the eight around.
-The second test keeps what is too small or too thin for the map's texels, and what lies just behind
-an edge, which an eye a little to the side may see; a triangle that turns its back to the eye fails
-it unless its material is double-sided.
+A triangle counts as seen if it shows in a near map, or if one of some points on it (its middle, and
+others along its edges, a few texels apart) has nothing solid before it, in its map's texel or in
+one of the eight around. The second test keeps what is too small or too thin for the map's texels,
+and what lies just behind an edge, which an eye a little to the side may see; a triangle that turns
+its back to the eye fails it unless its material is double-sided.
 """
 
 from __future__ import annotations
@@ -22,8 +22,10 @@ from farfield_worker.visibility.near_maps import NearMap, farthest_around
 
 Floats = NDArray[np.float64]
 
-#: where the points near corners lie, from the middle
-TOWARDS = 0.9
+#: where the points along edges lie, from the middle
+TOWARDS = 0.95
+#: texels between points along an edge, and points along one at most
+SPACING, MOST = 3.0, 8
 #: share by which a surface's own depth may differ between a map and our arithmetic
 ROUNDING = 1e-4
 
@@ -112,13 +114,16 @@ def _test(
             continue
         if not two_sided[t] and _turned(corners[t], eye):
             continue
-        for point in range(4):
+        along = _points(corners[t], eye, half)
+        for point in range(1 + 3 * along):
+            edge, step = (point - 1) // along, ((point - 1) % along) / along
             inside = True
             for a in range(3):
                 middle = (corners[t, 0, a] + corners[t, 1, a] + corners[t, 2, a]) / 3.0
                 p[a] = middle
                 if point > 0:
-                    p[a] += TOWARDS * (corners[t, point - 1, a] - middle)
+                    start, end = corners[t, edge, a], corners[t, (edge + 1) % 3, a]
+                    p[a] += TOWARDS * (start + step * (end - start) - middle)
                 inside = inside and abs(p[a]) <= half_width
                 q[a] = p[a] - eye[a]
             if not inside:
@@ -138,6 +143,19 @@ def _test(
             if solid[k, row, column] * depth <= 1.0 + ROUNDING:
                 seen[t] = True
                 break
+
+
+@njit(cache=True)
+def _points(c: Any, eye: Any, half: float) -> int:
+    """How many points along each edge are about SPACING texels apart, seen from `eye`."""
+    longest, nearest = 0.0, np.inf
+    for i in range(3):
+        length = distance = 0.0
+        for a in range(3):
+            length = max(length, abs(c[(i + 1) % 3, a] - c[i, a]))
+            distance = max(distance, abs(c[i, a] - eye[a]))
+        longest, nearest = max(longest, length), min(nearest, distance)
+    return int(min(max(np.ceil(longest * half / (max(nearest, 1e-9) * SPACING)), 1.0), MOST))
 
 
 @njit(cache=True)

@@ -39,7 +39,17 @@ def command(scene: str, corridor: Path, store: str, settings: BakeSettings, as_j
     click.echo(f"cells        {result.cells}")
     click.echo(f"near field   {result.near_field:.2f} m")
     click.echo(f"layers       {result.layers}")
-    click.echo("Estimates:")
-    click.echo(f"quads        {result.quads:.0f} a cell")
+    click.echo("Estimates for a cell (in brackets: with nothing hidden left out):")
+    for name, unit in (
+        ("near_triangles", ""),
+        ("most_near_triangles", ""),
+        ("quads", ""),
+        ("texels", ""),
+        ("kilobytes", " kB"),
+    ):
+        title = name.replace("_", " ")
+        value, before = getattr(result, name), result.before[name]
+        click.echo(f"{title:20} {value:.0f}{unit} ({before:.0f}{unit})")
+    click.echo("Estimates for the bake:")
     click.echo(f"files        {result.megabytes:.1f} MB")
     click.echo(f"time         {result.seconds:.0f} s of one process")

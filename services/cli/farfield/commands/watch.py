@@ -22,7 +22,7 @@ def command(bake: str, server: str, key: str, as_json: bool) -> None:
         now = client.bake_status(bake)
         progress = CellProgress(now.cells.total, now.cells.done)
         with progress:
-            for now in client.watch(bake):  # noqa: B020 - the last one is looked at below
+            for now in client.watch(bake):
                 progress.update(now.cells.done)
         if as_json:
             click.echo(json.dumps(now.model_dump()))

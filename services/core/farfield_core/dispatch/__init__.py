@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal, Protocol, runtime_checkable
+
+from farfield_core.dispatch.slots import Slot
 
 State = Literal["queued", "running", "paused", "cancelled", "done", "failed"]
 
@@ -93,4 +95,25 @@ class Dispatcher(Protocol):
 
     def close(self) -> None:
         """Stop all work at once and free everything."""
+        ...
+
+
+@runtime_checkable
+class FarmView(Protocol):
+    """What a dispatcher that feeds a farm knows of its workers."""
+
+    def slots(self) -> list[Slot]:
+        """Processes of living workers."""
+        ...
+
+    def aside(self) -> dict[str, str]:
+        """Living workers that were set aside, and why."""
+        ...
+
+    def left(self) -> int:
+        """Cells that are still to be baked of all bakes that may go on."""
+        ...
+
+    def wanted(self) -> int:
+        """Workers that those cells are worth."""
         ...

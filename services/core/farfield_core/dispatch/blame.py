@@ -1,4 +1,4 @@
-"""Whose fault it is: a cell that fails on worker after worker, or a worker that fails cell after cell.
+"""Whose fault it is: a cell that fails on every worker, or a worker that fails every cell.
 
 A cell is given up after three attempts on three workers, or on as many as there are. A worker is to
 be set aside when three cells that it failed were then baked by others.

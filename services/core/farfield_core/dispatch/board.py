@@ -1,6 +1,6 @@
 """What workers and the feeder tell each other through Redis, beside the queue.
 
-    farfield:slot:<worker>:<process>  a process that bakes: who it is, its cell, its figures; expires
+    farfield:slot:<worker>:<process>  who a process is, its cell, its figures; expires
     farfield:baking:<bake>:<cell>     which process bakes a cell; expires
     farfield:reports:<bake>           cells done and tried, oldest first; expires
     farfield:cancelled:<bake>         processes with a cell of this bake are to drop it; expires
@@ -18,41 +18,14 @@ from typing import Any
 
 from redis import Redis
 
+from farfield_core.dispatch.slots import Slot
+
 #: seconds between signs of life, and after which a process counts as lost
 BEAT, LOST = 1.0, 10
 #: reports kept for a feeder that is away
 _KEPT = 10_000
 #: seconds for which reports and cancellations are kept
 _EXPIRE = 3600
-
-
-@dataclass(frozen=True)
-class Slot:
-    """A process of a worker, as it describes itself.
-
-    Attributes:
-        worker: name of the worker, one for all its processes.
-        process: its process id.
-        host: the machine.
-        device: the queues it serves, "cpu" or "gpu".
-        renderer: GL vendor and renderer; empty until the first cell.
-        bake, cell: what it bakes; empty when idle.
-        done, tried: cells it finished, and attempts that went wrong.
-        rate: cells a second over the last minutes.
-        megabytes: memory of the baking process.
-    """
-
-    worker: str
-    process: int
-    host: str = ""
-    device: str = "cpu"
-    renderer: str = ""
-    bake: str = ""
-    cell: str = ""
-    done: int = 0
-    tried: int = 0
-    rate: float = 0.0
-    megabytes: float = 0.0
 
 
 @dataclass(frozen=True)

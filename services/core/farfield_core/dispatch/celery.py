@@ -14,6 +14,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Literal
 
 from kombu.exceptions import OperationalError
@@ -23,10 +24,12 @@ from farfield_core import control
 from farfield_core.bake import done_names
 from farfield_core.dispatch import ENDED, BakeStatus, Event, Listener
 from farfield_core.dispatch.blame import Blame
-from farfield_core.dispatch.board import Board, Report, Slot
+from farfield_core.dispatch.board import Board, Report
 from farfield_core.dispatch.jobs import Job
 from farfield_core.dispatch.mail import Mail
 from farfield_core.dispatch.queues import Device
+from farfield_core.dispatch.slots import Slot
+from farfield_core.dispatch.wanted import wanted_workers
 from farfield_core.errors import FarfieldError, NotFoundError
 from farfield_core.store import Store
 
@@ -36,6 +39,8 @@ _REDIS_ERRORS = (OperationalError, RedisError, ConnectionError, TimeoutError)
 
 #: seconds between lists of a bake's cells, and how much longer than a list takes that has to be
 _LIST, _LIST_SHARE = 5.0, 20
+#: cells taken in, and cells sent, in one go
+_PORTION, _SENT_AT_ONCE = 1000, 10
 #: seconds between looks into a queue that is not empty
 _PEEK = 5.0
 
@@ -123,7 +128,7 @@ class CeleryDispatcher:
                 if near not in chosen:
                     job.put_back(near)
                     break
-                if not self._without_redis(lambda cell=near: self._send(job, cell, urgent=True)):
+                if not self._without_redis(partial(self._send, job, near, urgent=True)):
                     break
 
     def pause(self, bake: str) -> None:
@@ -153,8 +158,8 @@ class CeleryDispatcher:
 
     def status(self, bake: str) -> BakeStatus:
         """Where a bake stands; raises NotFoundError for one never submitted."""
-        with self._changed:
-            return self._job(bake).status()
+        # without the lock: numbers may be a moment apart, but nobody waits for the feeder
+        return self._job(bake).status()
 
     def wait(self, bake: str, timeout: float | None = None) -> BakeStatus:
         """Wait until a bake has ended, or for `timeout` seconds."""
@@ -178,6 +183,10 @@ class CeleryDispatcher:
         with self._changed:
             jobs = [job for job in self._jobs.values() if job.state in ("queued", "running")]
             return sum(job.left for job in jobs)
+
+    def wanted(self) -> int:
+        """Workers that the cells still to be baked are worth."""
+        return wanted_workers(self.left(), self.slots())
 
     def close(self) -> None:
         """Feed the farm no more; workers finish what is in the queue."""
@@ -260,9 +269,8 @@ class CeleryDispatcher:
     def _hear(self) -> None:
         """Take in what workers say of their cells."""
         for job in self._under_way():
-            reports = self._board.reports(job.bake)
-            with self._changed:
-                for report in reports:
+            for report in self._board.reports(job.bake):
+                with self._changed:
                     if report.attempt:
                         attempt = control.Attempt(worker=report.worker, reason=report.reason)
                         self._tried(job, report.cell, report.attempt, attempt)
@@ -284,7 +292,14 @@ class CeleryDispatcher:
             with self._changed:
                 for cell, name, attempt in attempts:
                     self._tried(job, cell, name, attempt)
-                self._done(job, job.confirm(seen, before))
+                rows = job.confirm(seen, before)
+            # in small portions, so that nobody who asks has to wait
+            for first in range(0, len(rows), _PORTION):
+                with self._changed:
+                    self._done(job, job.found_rows(rows[first : first + _PORTION]))
+                self._tell_events()
+            with self._changed:
+                job.let_end()
                 now = time.monotonic()
                 self._next_list[job.bake] = now + max(_LIST, _LIST_SHARE * (now - started))
 
@@ -349,13 +364,29 @@ class CeleryDispatcher:
 
     def _feed(self) -> None:
         """Fill the queue up to its limit."""
-        waiting = self._mail.waiting()
-        with self._changed:
-            room = self._queue_limit - waiting.others
-            for job in self._jobs.values():
-                while room > 0 and (following := job.take()) is not None:
-                    self._send(job, following)
-                    room -= 1
+        room = self._queue_limit - self._mail.waiting().others
+        while room > 0 and not self._closed:
+            # in small portions, so that nobody who asks has to wait
+            with self._changed:
+                portion = self._portion(min(room, _SENT_AT_ONCE))
+                try:
+                    for job, cell in portion:
+                        self._send(job, cell)
+                finally:  # what was taken and not sent, because Redis is gone, waits again
+                    for job, cell in portion:
+                        if (job.bake, cell) not in self._sent:
+                            self._put_back(job, cell)
+            room -= len(portion)
+            if not portion:
+                return
+
+    def _portion(self, size: int) -> list[tuple[Job, str]]:
+        """Up to so many cells to send next."""
+        found: list[tuple[Job, str]] = []
+        for job in self._jobs.values():
+            while len(found) < size and (cell := job.take()) is not None:
+                found.append((job, cell))
+        return found
 
     def _send(self, job: Job, cell: str, urgent: bool = False) -> None:
         failed = self._blame.workers(job.bake, cell)
@@ -385,6 +416,9 @@ class CeleryDispatcher:
                 if self._told.get(bake) != job.state:
                     self._told[bake] = job.state
                     self._events.append(Event(bake, "state", job.state, reason=job.reason))
+        self._tell_events()
+
+    def _tell_events(self) -> None:
         while self._events:
             event = self._events.popleft()
             if self._listener is not None:

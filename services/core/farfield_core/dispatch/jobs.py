@@ -33,7 +33,7 @@ class Job:
         reason: why the bake as a whole cannot go on, or does not.
         running: cells under way.
         failed: why each failed cell failed.
-        hold: whether the bake does not end before `confirm`.
+        hold: whether the bake does not end before `let_end`.
     """
 
     def __init__(self, store: Store, bake: str, hold: bool = False) -> None:
@@ -84,7 +84,11 @@ class Job:
     def found(self, cells: Iterable[str]) -> list[str]:
         """These cells exist; returns those of which that was not known."""
         rows = self._rows.find(cells)
-        fresh = np.unique(rows[(rows >= 0) & (self._states[rows] != _DONE)])
+        return self.found_rows(rows[rows >= 0])
+
+    def found_rows(self, rows: NDArray[np.int64]) -> list[str]:
+        """The same for rows of cells, (n,) int64."""
+        fresh = np.unique(rows[self._states[rows] != _DONE])
         names = [self._rows.name(row) for row in fresh.tolist()]
         for name in names:
             if self.failed.pop(name, None) is not None:
@@ -107,8 +111,8 @@ class Job:
             seen[rows[rows >= 0]] = True
         return seen
 
-    def confirm(self, seen: NDArray[np.bool_], before: NDArray[np.bool_]) -> list[str]:
-        """The store lists the cells `seen`; returns those of which that was not known.
+    def confirm(self, seen: NDArray[np.bool_], before: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """The store lists the cells `seen`; returns rows of those of which that is not known.
 
         `before` is the snapshot from when listing began: what it holds and the list does not is
         gone and waits again.
@@ -117,11 +121,13 @@ class Job:
         self._states[gone] = _WAITING
         self._front.extend(gone.tolist())
         self._open += len(gone)
-        fresh = np.flatnonzero(seen & (self._states != _DONE))
+        return np.flatnonzero(seen & (self._states != _DONE))
+
+    def let_end(self) -> None:
+        """The bake ends now if nothing is left: the store lists what is said to be done."""
         hold, self.hold = self.hold, False
-        names = self.found([self._rows.name(row) for row in fresh.tolist()])
+        self._settle()
         self.hold = hold
-        return names
 
     def put_back(self, cell: str) -> None:
         """A cell was not finished, through no fault of its own."""

@@ -7,7 +7,6 @@ import json
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from kombu import Connection
 from redis import Redis
 
 from farfield_core.dispatch.queues import BAKE_CELL, Device, celery_app, cell_queues
@@ -58,9 +57,9 @@ class Mail:
         queue = self._urgent if urgent else self._others
         mine: list[str] = []
         others: list[list[Any]] = []
-        connection: Connection
         with self._app.connection_for_write() as connection:
-            while (message := connection.default_channel.basic_get(queue, no_ack=True)) is not None:
+            channel: Any = connection.default_channel
+            while (message := channel.basic_get(queue, no_ack=True)) is not None:
                 arguments, *_ = message.decode()
                 if arguments[0] == bake:
                     mine.append(arguments[1])

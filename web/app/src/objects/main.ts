@@ -1,11 +1,17 @@
 /** The example pages of object impostors: `?show=many`, and what else `SHOWS` names. */
 
+import { showGlass } from './glass.js';
 import { showMany } from './many.js';
+import { showRing } from './ring.js';
 import { Stand, type Show } from './stand.js';
+import { showStones } from './stones.js';
 import { showWalk } from './walk.js';
 
 const SHOWS: Record<string, (stand: Stand, query: URLSearchParams) => Show | Promise<Show>> = {
   many: showMany,
+  stones: showStones,
+  ring: showRing,
+  glass: showGlass,
   walk: showWalk,
 };
 

@@ -1,7 +1,6 @@
 /** The divider between the walk and the full model. */
 
-import { useRef } from 'preact/hooks';
-import { useState } from 'preact/hooks';
+import { useRef, useState } from 'preact/hooks';
 import type { JSX } from 'preact';
 import type { Session } from './session.js';
 
@@ -17,7 +16,7 @@ export function Compare({ session, close }: { session: Session; close: () => voi
   };
   if (comparison.state !== 'ready') {
     return (
-      <div class="center quiet" role="status">
+      <div class={comparison.state === 'failed' ? 'center' : 'center quiet'} role="status">
         {comparison.state === 'failed' ? (
           <div class="card" role="alert">
             <h1>The full model can’t be shown</h1>

@@ -76,14 +76,17 @@ function open(ui: HTMLElement, canvas: HTMLCanvasElement): void {
   });
   const path = pathUrl(page);
   if (path !== undefined) {
-    Promise.all([playable(path), window.farfield.ready]).then(
-      ([file]) => session.play(file),
-      (error: unknown) => {
-        if (session.walk.manifest !== undefined) {
-          const { title, text } = explain(asError(error));
-          fail(title, text);
-        }
-      },
+    // A walk that can't be opened says so itself.
+    window.farfield.ready.then(
+      () =>
+        playable(path).then(
+          (file) => session.play(file),
+          (error: unknown) => {
+            const { title, text } = explain(asError(error));
+            fail(title, text);
+          },
+        ),
+      () => undefined,
     );
   }
   if (!capture) render(<Interface session={session} />, ui);

@@ -1,6 +1,6 @@
 /** One visit to a walk: renderer, camera, walker and the frame loop. */
 
-import { cellDistance, type Vec3 } from '@farfield/core';
+import { FetchQueue, ZipSource, cellDistance, type Vec3 } from '@farfield/core';
 import { Walk, setInfiniteFar } from '@farfield/three';
 import { Overlays } from '@farfield/three/overlays';
 import { Group, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
@@ -20,6 +20,11 @@ export interface SessionOptions {
   readonly manifestUrl: string;
   readonly capture: boolean;
   readonly textureBytes: number;
+}
+
+/** A walk in a zip is read out of it. */
+function zipOf(url: string): ZipSource | undefined {
+  return new URL(url).pathname.endsWith('.zip') ? new ZipSource(url) : undefined;
 }
 
 export class Session {
@@ -63,7 +68,9 @@ export class Session {
     this.renderer.setClearColor(0x000000, capture ? 0 : 1);
     this.camera = new PerspectiveCamera(FOV, 1, 0.1, 1000);
     this.camera.rotation.order = 'YXZ';
-    this.walk = new Walk(options.manifestUrl, {
+    const zip = zipOf(options.manifestUrl);
+    this.walk = new Walk(zip?.manifestUrl ?? options.manifestUrl, {
+      ...(zip === undefined ? {} : { queue: new FetchQueue({ fetch: zip.fetch }) }),
       renderer: this.renderer,
       backgroundAlpha: capture ? 0 : 1,
       textureBytes: options.textureBytes,

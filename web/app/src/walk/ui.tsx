@@ -57,7 +57,10 @@ export function Interface({ session }: { session: Session }): JSX.Element {
         <h1 class="title">{state.name}</h1>
         <nav class="buttons">
           {state.phase === 'walking' && headset ? (
-            <button type="button" onClick={() => void session.headset.enter()}>
+            <button
+              type="button"
+              onClick={() => void session.headset.enter().catch(() => undefined)}
+            >
               VR
             </button>
           ) : null}

@@ -69,6 +69,8 @@ export class Walker {
   private velocity: [number, number, number] = [0, 0, 0];
   /** Height kept above the ground; 'person' is eye level, undefined is as high as it happens to be. */
   private height: number | 'person' | undefined;
+  /** Whether that height is above real ground, or above the floor of the cells. */
+  private aboveGround = false;
 
   get pose(): Pose {
     return { eye: this.eye, yaw: this.yaw, pitch: this.pitch };
@@ -204,6 +206,12 @@ export class Walker {
     if (this.height === 'person') {
       if (known === undefined) return;
       this.height = EYE * unit;
+      this.aboveGround = true;
+    }
+    // Ground that has just come to be known is another thing to stand above, not a drop.
+    if (ground !== undefined && (known !== undefined) !== this.aboveGround) {
+      this.aboveGround = known !== undefined;
+      this.height = undefined;
     }
     if (this.fly || intent.up !== 0 || this.height === undefined || ground === undefined) {
       if (this.fly || intent.up !== 0) this.height = undefined;

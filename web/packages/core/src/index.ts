@@ -20,3 +20,4 @@ export * from './quads.js';
 export * from './shared-store.js';
 export * from './solid.js';
 export * from './upload-scheduler.js';
+export * from './zip.js';

@@ -1,7 +1,7 @@
 /**
  * Objects in a cell's near field. Near blocks are cut by place, not by object, so objects are found
- * again from the triangles: those that share a vertex hang together, and pieces whose boxes overlap,
- * as leaves and their trunk do, are one object. What is larger than `largest` or reaches out of the
+ * again from the triangles: those that share a vertex hang together, and pieces of which one lies for
+ * the most part within the other's box, as leaves and their trunk do, are one object. What is larger than `largest` or reaches out of the
  * near field, such as the ground, stays as it is.
  */
 
@@ -164,19 +164,20 @@ function findPieces(
 }
 
 /**
- * Join movable pieces whose boxes overlap while the whole stays small enough; boxes of roots grow.
+ * Join movable pieces whose boxes share most of the smaller one while the whole stays small enough; boxes of roots grow.
  * Returns the root of each piece, -1 for those that cannot move.
  */
 function joinPieces(pieces: readonly Piece[], { largest }: FindOptions): Int32Array {
   const sets = new Sets(pieces.length);
   const movable = pieces.map((_, n) => n).filter((n) => pieces[n].movable);
   const joined = (a: Piece, b: Piece): boolean =>
-    [0, 1, 2].every(
-      (axis) =>
-        a.low[axis] <= b.high[axis] &&
-        b.low[axis] <= a.high[axis] &&
-        Math.max(a.high[axis], b.high[axis]) - Math.min(a.low[axis], b.low[axis]) <= largest,
-    );
+    [0, 1, 2].every((axis) => {
+      const overlap = Math.min(a.high[axis], b.high[axis]) - Math.max(a.low[axis], b.low[axis]);
+      const smaller = Math.min(a.high[axis] - a.low[axis], b.high[axis] - b.low[axis]);
+      const whole = Math.max(a.high[axis], b.high[axis]) - Math.min(a.low[axis], b.low[axis]);
+      // Less than half, and they are neighbours that touch.
+      return overlap >= smaller / 2 && whole <= largest;
+    });
   for (let changed = true; changed;) {
     changed = false;
     // Sweep along x: only boxes that are open at the same time can overlap.

@@ -54,12 +54,12 @@ describe('findObjects', () => {
     expect(objects[1].bounds).toEqual({ min: [8, -1, -1], max: [10, 1, 1] });
   });
 
-  test('overlapping boxes are one object across batches, up to the largest size', () => {
+  test('boxes that share more than half are one object across batches, up to the largest size', () => {
     const trunk = tetrahedra([[0, 0, 0]], 1);
     const leaves = tetrahedra(
       [
-        [1.5, 0, 0],
-        [3, 0, 0],
+        [0.8, 0, 0],
+        [1.6, 0, 0],
         [20, 0, 0],
       ],
       1,
@@ -70,7 +70,7 @@ describe('findObjects', () => {
       [0, 12],
       [1, 24],
     ]);
-    const small = findObjects([trunk, leaves], { ...OPTIONS, largest: 4 });
+    const small = findObjects([trunk, leaves], { ...OPTIONS, largest: 3 });
     expect(small.objects.map(({ triangles }) => triangles).sort()).toEqual([4, 4, 8]);
   });
 

@@ -75,8 +75,7 @@ describe('viewAngle', () => {
         );
         // A small step turns a point by at most step / distance, and the near point is nearest.
         const [near] = nearAndFar(BOX, now);
-        // Up to rounding.
-        const bound = (length(step) / (distance(near, now) - length(step))) * (1 + 1e-12) + 1e-12;
+        const bound = length(step) / (distance(near, now) - length(step)) + 1e-9;
         expect(Math.max(...turned)).toBeLessThanOrEqual(bound);
         expect(viewAngle(BOX, before, now)).toBeLessThanOrEqual(bound);
         // The farthest point is among the samples, maybe with others as far as it.

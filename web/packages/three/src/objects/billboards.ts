@@ -68,9 +68,8 @@ void main() {
 #else
   float fog = smoothstep(fogNear, fogFar, v_depth);
 #endif
-  // Light mixes in linear terms; the picture is encoded.
-  vec3 lit = sRGBTransferEOTF(vec4(color.rgb / color.a, 1.0)).rgb;
-  color.rgb = color.a * sRGBTransferOETF(vec4(mix(lit, fogColor, fog), 1.0)).rgb;
+  // three.js lays fog over encoded colours; here they are multiplied by alpha as well.
+  color.rgb = mix(color.rgb, color.a * fogColor, fog);
 #endif
 }
 `;

@@ -7,3 +7,9 @@ export {
   type ObjectImpostorsOptions,
 } from './object-impostors.js';
 export type { NearImpostors } from './walk-objects.js';
+export {
+  TrueImpostors,
+  loadObject,
+  type BakedObject,
+  type TrueImpostorOptions,
+} from './true-impostors.js';

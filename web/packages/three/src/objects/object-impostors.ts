@@ -66,6 +66,7 @@ export class ObjectImpostors {
     this.billboards = new Billboards(this.atlas.target.texture, size);
     this.group.name = 'farfield impostors';
     this.group.add(this.billboards.mesh);
+    this.renderer.domElement.addEventListener('webglcontextlost', this.onContextLost);
   }
 
   /**
@@ -124,17 +125,8 @@ export class ObjectImpostors {
     return { ...this.counts, objects: this.items.size, fill: this.atlas.slots.fill };
   }
 
-  /** The graphics context was lost: every object is drawn as itself until it has a new picture. */
-  forget(): void {
-    this.atlas.forget();
-    for (const item of this.items.values()) {
-      item.drop(-Infinity, true);
-      item.object.visible = true;
-    }
-    this.billboards.write([]);
-  }
-
   dispose(): void {
+    this.renderer.domElement.removeEventListener('webglcontextlost', this.onContextLost);
     for (const object of [...this.items.keys()]) this.remove(object);
     this.billboards.dispose();
     this.atlas.dispose();
@@ -170,6 +162,16 @@ export class ObjectImpostors {
     }
     return undefined;
   }
+
+  /** Every object is drawn as itself until it has a new picture. */
+  private readonly onContextLost = (): void => {
+    this.atlas.forget();
+    for (const item of this.items.values()) {
+      item.drop(-Infinity, true);
+      item.object.visible = true;
+    }
+    this.billboards.write([]);
+  };
 
   private eye(camera: Camera): Eye {
     camera.updateWorldMatrix(true, false);

@@ -6,11 +6,13 @@
 import { type Frame, type Slot } from '@farfield/core';
 import {
   Color,
+  DirectionalLight,
   Light,
   Matrix4,
   PerspectiveCamera,
   Quaternion,
   Scene,
+  SpotLight,
   Vector3,
   type Object3D,
   type WebGLRenderer,
@@ -51,7 +53,13 @@ export class PictureTaker {
     const { renderer, scene, camera, atlas } = this;
     const lights: Object3D[] = [];
     root.traverseVisible((object) => {
-      if (object instanceof Light) lights.push(object);
+      if (!(object instanceof Light)) return;
+      // Pictures may be taken before the frame that first brings the scene's matrices up to date.
+      object.updateWorldMatrix(true, false);
+      if (object instanceof DirectionalLight || object instanceof SpotLight) {
+        object.target.updateWorldMatrix(true, false);
+      }
+      lights.push(object);
     });
     scene.environment = root instanceof Scene ? root.environment : null;
     const restore = quieten(renderer);

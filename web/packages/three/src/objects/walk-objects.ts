@@ -75,7 +75,6 @@ export class WalkObjects {
   forget(): void {
     this.showNear(undefined);
     this.view = undefined;
-    this.impostors.forget();
   }
 
   dispose(): void {
