@@ -57,6 +57,7 @@ class Job:
         there = self.listed(done_names(store, bake))
         self._states[there] = _DONE
         self._open -= int(there.sum())
+        self._settle()
 
     def first(self, cells: Iterable[str]) -> None:
         """Move waiting cells to the front."""
