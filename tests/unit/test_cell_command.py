@@ -35,11 +35,13 @@ def test_answers_one_line_each_until_its_input_ends(tmp_path):
         "cell": "nonsense",
         "ok": False,
         "error": "'nonsense' is not a cell; cells are named i_j_k, as in 0_0_3.",
+        "store": False,
     }
     assert lines[3] == {
         "cell": "9_9_9",
         "ok": False,
         "error": "The corridor has no cell 9_9_9.",
+        "store": False,
     }
     # a cell that exists is success, and stays as it was
     assert lines[4]["ok"] is True

@@ -25,7 +25,7 @@ export function Minimap({ session }: { session: Session }): JSX.Element {
     return () => clearInterval(timer);
   }, [session]);
   return (
-    <figure class="map">
+    <figure class="minimap">
       <canvas
         ref={canvas}
         style={{ width: `${WIDTH}px`, height: `${HEIGHT}px` }}
