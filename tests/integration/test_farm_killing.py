@@ -192,6 +192,7 @@ def test_what_a_cell_costs_redis_and_s3(
     assert taken < 0.05 * 0.9
 
 
+@pytest.mark.alone
 def test_two_workers_bake_twice_as_fast_as_one(farm: Farm) -> None:
     """In the soak on processor time; otherwise cells only wait, as a busy machine has none left."""
     act = "burn 0.5" if SOAK else "0.5"
