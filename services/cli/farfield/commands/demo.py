@@ -26,7 +26,6 @@ from farfield.options import jobs_option, port_options, settings_options, store_
 from farfield.progress import CellProgress, console, working
 from farfield.server import Server
 from farfield.target import prepared_scene
-from farfield.warming import warming_up
 
 
 @click.command("demo")
@@ -70,8 +69,7 @@ def command(
     service = create_service(api)
     try:
         with server.beside(create_app(api, service)):
-            with warming_up():
-                identity = _scene(service.store, scene, detail)
+            identity = _scene(service.store, scene, detail)
             bake = _begin(service, identity, wanted, settings)
             _watch(service, bake, f"{server.address}/walk/{bake}")
     except KeyboardInterrupt:
