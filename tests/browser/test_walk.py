@@ -146,3 +146,27 @@ def test_static_hosting(visit: Visit, server: WalkServer) -> None:
     walk = f"{server.url}/api/v1/walks/room/walk.json"
     visit.open(f"{server.url}/walk/index.html?capture&walk={walk}")
     assert visit.call("return farfield.stats.cell") == "0_0_0"
+
+
+def test_a_cell_fades_into_the_next(visit: Visit, server: WalkServer) -> None:
+    """On the way every pixel is one cell's or the other's, and some are each."""
+    visit.page.set_viewport_size({"width": 320, "height": 240})
+    before, after = (7.5, 2.0, 4.0, EAST, 0.0), (8.5, 2.0, 4.0, EAST, 0.0)
+    visit.open(f"{server.url}/walk/room?capture&fade=3")
+    visit.go_to(*before)
+    visit.call("farfield.session.walk.frozen = true; farfield.session.stop();")
+    visit.call(f"farfield.session.place({{ eye: {list(after[:3])}, yaw: {EAST}, pitch: 0 }});")
+    going = visit.pixels()
+    visit.call("farfield.session.walk.frozen = false;")
+    visit.page.wait_for_function(
+        "farfield.session.draw() ?? farfield.session.walk.cell.name !== '0_0_0'"
+    )
+    visit.page.wait_for_timeout(1000)
+    between = visit.pixels()
+    visit.page.wait_for_timeout(3000)
+    come = visit.pixels()
+    of_going, of_come = (between == going).all(axis=2), (between == come).all(axis=2)
+    assert (of_going | of_come).all()
+    differ = (going != come).any(axis=2)
+    assert differ.mean() > 0.01
+    assert 0.1 < of_come[differ].mean() < 0.9

@@ -44,6 +44,12 @@ export function textureMemory(page: URL): number | undefined {
   return asked >= 1 && asked <= 16_384 ? asked : undefined;
 }
 
+/** `?fade=S`: seconds in which one cell fades into the next; 0 unless it is a number that can be meant. */
+export function fadeSeconds(page: URL): number {
+  const asked = Number(page.searchParams.get('fade') ?? NaN);
+  return asked > 0 && asked <= 5 ? asked : 0;
+}
+
 /** `?path=URL`: a recorded path to play. */
 export function pathUrl(page: URL): string | undefined {
   const asked = page.searchParams.get('path');

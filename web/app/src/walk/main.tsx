@@ -3,7 +3,7 @@
 import { FarfieldError, asError } from '@farfield/core';
 import { render } from 'preact';
 import '../styles.css';
-import { isCapture, manifestUrl, pathUrl, textureMemory } from './address.js';
+import { fadeSeconds, isCapture, manifestUrl, pathUrl, textureMemory } from './address.js';
 import { createHooks, type Hooks } from './capture.js';
 import { parsePath, type PathFile } from './path.js';
 import { Session } from './session.js';
@@ -57,6 +57,7 @@ function open(ui: HTMLElement, canvas: HTMLCanvasElement): void {
     canvas,
     manifestUrl: url,
     capture,
+    fade: fadeSeconds(page),
     textureBytes: (textureMemory(page) ?? textureMegabytes()) * 2 ** 20,
   });
   window.farfield = createHooks(session);

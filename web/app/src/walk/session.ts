@@ -20,6 +20,8 @@ export interface SessionOptions {
   readonly manifestUrl: string;
   readonly capture: boolean;
   readonly textureBytes: number;
+  /** Seconds in which one cell fades into the next. */
+  readonly fade: number;
 }
 
 /** A walk in a zip is read out of it. */
@@ -74,6 +76,7 @@ export class Session {
       renderer: this.renderer,
       backgroundAlpha: capture ? 0 : 1,
       textureBytes: options.textureBytes,
+      fade: options.fade,
     });
     this.scene.add(this.walk.group);
     this.walk.setCamera(this.camera);

@@ -22,6 +22,8 @@ export class CellView {
   readonly solid: Solid;
   /** Bytes of all vertex and index buffers. */
   readonly bytes: number;
+  /** Which pixels it is drawn at, see `FADE_GLSL`. */
+  fade = 0;
   private readonly release: () => void;
 
   /**

@@ -1,7 +1,15 @@
 /** Draws all quads of a cell: homogeneous vertices, pages in one texture array, colours as stored. */
 
-import { GLSL3, LessDepth, DoubleSide, RawShaderMaterial, type DataArrayTexture } from 'three';
+import {
+  GLSL3,
+  LessDepth,
+  DoubleSide,
+  RawShaderMaterial,
+  type DataArrayTexture,
+  type IUniform,
+} from 'three';
 import { PAGES } from '@farfield/core';
+import { FADE_GLSL } from './fade.js';
 import { CLIP_GLSL } from './projection.js';
 
 const VERTEX = `
@@ -40,7 +48,9 @@ flat in int v_slot;
 flat in vec3 v_tint;
 #endif
 out vec4 color;
+${FADE_GLSL}
 void main() {
+  if (ff_faded()) discard;
   vec4 texel = texelFetch(ff_pages, ivec3(floor(v_texel), v_slot), 0);
   if (texel.a < 0.5) discard;
   color = vec4(texel.rgb, 1.0);
@@ -50,13 +60,17 @@ void main() {
 }
 `;
 
-export function createFarMaterial(pages: DataArrayTexture): RawShaderMaterial {
+/** Pages to sample, and the fade of the cell that is drawn next. */
+export function createFarMaterial(
+  pages: DataArrayTexture,
+  fade: IUniform<number>,
+): RawShaderMaterial {
   return new RawShaderMaterial({
     name: 'farfield far',
     glslVersion: GLSL3,
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
-    uniforms: { ff_pages: { value: pages } },
+    uniforms: { ff_pages: { value: pages }, ff_fade: fade },
     side: DoubleSide,
     depthFunc: LessDepth,
     toneMapped: false,

@@ -11,6 +11,7 @@ import {
   type IUniform,
   type Texture,
 } from 'three';
+import { FADE_GLSL } from './fade.js';
 import type { Uniforms } from './light.js';
 import { CLIP_GLSL } from './projection.js';
 import { LIGHT_GLSL } from './shading.generated.js';
@@ -63,7 +64,9 @@ uniform sampler2D ff_emissive_map;
 #endif
 out vec4 color;
 ${LIGHT_GLSL}
+${FADE_GLSL}
 void main() {
+  if (ff_faded()) discard;
   vec4 base = v_color;
   vec3 emissive = ff_emissive;
 #ifdef MAP
@@ -90,6 +93,8 @@ void main() {
 export class NearMaterials {
   /** Top edge of the viewport in gl_FragCoord's terms. */
   readonly top: IUniform<number> = { value: 0 };
+  /** Of the cell that is drawn next. */
+  readonly fade: IUniform<number> = { value: 0 };
   private readonly shared: Uniforms;
   private readonly materials = new Map<string, RawShaderMaterial>();
 
@@ -98,6 +103,7 @@ export class NearMaterials {
       ...light,
       ff_near_field: { value: NEAR_OVERLAP * nearField },
       ff_top: this.top,
+      ff_fade: this.fade,
     };
   }
 

@@ -13,6 +13,7 @@ import { Vector4, type Camera, type Group, type IUniform, type WebGLRenderer } f
 import { AttributeUpload } from './attribute-upload.js';
 import { CellLoader } from './cell-loader.js';
 import type { CellView } from './cell-view.js';
+import { fadeWith } from './fade.js';
 import { createFarMaterial } from './far-material.js';
 import { lightUniforms } from './light.js';
 import { NearMaterials } from './near-materials.js';
@@ -73,7 +74,7 @@ export class Stage {
       pressure,
     });
     this.materials = new NearMaterials(light, manifest.walk.near_field);
-    this.farMaterial = createFarMaterial(this.pages.texture);
+    this.farMaterial = createFarMaterial(this.pages.texture, this.materials.fade);
     this.loader = new CellLoader({
       manifest,
       queue,
@@ -120,12 +121,15 @@ export class Stage {
     this.sky?.material.dispose();
   }
 
-  /** Tell near meshes where the top of the picture is, for the dither pattern. */
+  /** Tell meshes of their cell's fade, near ones where the top of the picture is, for the dither pattern. */
   private prepare(view: CellView): void {
-    const { top } = this.materials;
+    const { fade, top } = this.materials;
     const viewport = new Vector4();
+    const { far } = view;
+    if (far !== undefined) far.onBeforeRender = () => fadeWith(view, far, fade);
     for (const mesh of view.near) {
       mesh.onBeforeRender = (renderer) => {
+        fadeWith(view, mesh, fade);
         renderer.getCurrentViewport(viewport);
         if (top.value === viewport.y + viewport.w) return;
         top.value = viewport.y + viewport.w;

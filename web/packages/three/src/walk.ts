@@ -25,6 +25,7 @@ import {
   type WebGLRenderer,
 } from 'three';
 import type { CellView } from './cell-view.js';
+import { Fade } from './fade.js';
 import { MotionTracker } from './motion.js';
 import type { ImpostorOptions } from './objects/object-impostor.js';
 import { WalkObjects, type NearImpostors } from './objects/walk-objects.js';
@@ -48,6 +49,8 @@ export interface WalkOptions {
   readonly backgroundAlpha?: number;
   /** Downloads; share one between walks to share its limit of requests. */
   readonly queue?: FetchQueue;
+  /** Seconds in which one cell fades into the next. Default 0: at once. */
+  readonly fade?: number;
   /** Whether costly objects of the near field are drawn as impostors. Default 'never'. */
   readonly nearImpostors?: NearImpostors;
 }
@@ -89,6 +92,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
   private readonly queue: FetchQueue;
   private readonly builder: CellBuilder;
   private readonly motion = new MotionTracker();
+  private readonly fade: Fade;
   private readonly abort = new AbortController();
   private readonly alpha: IUniform<number>;
   private stage: Stage | undefined;
@@ -111,6 +115,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
       group: this.group,
       near: options.nearImpostors ?? 'never',
     });
+    this.fade = new Fade(options.fade ?? 0);
     this.alpha = { value: options.backgroundAlpha ?? 1 };
     this.loaded = this.load();
     this.loaded.catch((error: unknown) => {
@@ -139,7 +144,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
       const view = stage.streamer.update(motion);
       const { shown } = stage.streamer;
       if (view !== undefined && view !== this.shownView) {
-        if (this.shownView !== undefined) this.shownView.group.visible = false;
+        this.fade.change(this.shownView, view, now);
         this.shownView = view;
         if (shown !== undefined && shown.name !== this.shown?.name) {
           this.shown = shown;
@@ -148,6 +153,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
       }
     }
     this.showCells();
+    this.fade.update(now, this.visible);
     stage.uploads.frame(this.options.uploadBytes ?? MEGABYTE);
     stage.attributes.update();
     this.objects.update(this.view, this.manifest?.walk.near_field ?? Infinity, camera, now);
@@ -315,6 +321,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
   private readonly onContextLost = (event: Event): void => {
     event.preventDefault();
     this.objects.forget();
+    this.fade.end();
     // Everything on the graphics card is gone, and can only be let go of before a new context comes.
     this.stage?.dispose();
     this.stage = undefined;

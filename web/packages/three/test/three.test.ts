@@ -149,7 +149,7 @@ describe('CellView', () => {
     const bytes = new TextEncoder().encode(JSON.stringify(cell)).buffer;
     const built = await new InlineBuilder().cell(bytes, 64);
     let released = 0;
-    const material = createFarMaterial({} as never);
+    const material = createFarMaterial({} as never, { value: 0 });
     const view = new CellView(built, [7, 3], material, [], [], EMPTY, () => released++);
     const slots = [...(view.far?.geometry.attributes.texel.array ?? [])].filter(
       (_, n) => n % 3 === 2,
