@@ -10,11 +10,11 @@ from pathlib import Path
 
 from farfield_core import scenes as core_scenes
 from farfield_core.bake import create_bake
+from farfield_core.budget import within_budget
 from farfield_core.corridor import Corridor, Ground, parse_corridor
 from farfield_core.dispatch import Dispatcher, FarmView, Listener
 from farfield_core.errors import BadInputError, NotFoundError
 from farfield_core.ground import ground_under
-from farfield_core.plan import plan
 from farfield_core.scene import SceneInfo
 from farfield_core.settings import BakeSettings
 from farfield_core.store import Store
@@ -117,7 +117,7 @@ class FarfieldService:
         """Write a bake's manifest and have it baked; returns its id."""
         info = self.ready_scene(scene)
         most = self.settings.quota_cells
-        if most and (cells := plan(info, corridor, settings).cells) > most:
+        if most and (cells := within_budget(info, corridor, settings).plan.cells) > most:
             raise QuotaError(
                 f"The corridor has {cells} cells, more than the {most} that this server bakes in "
                 "one go; make it smaller, or its cells larger."

@@ -126,12 +126,26 @@ def _value(name: str, text: str) -> object:
                 f"--cell-size {text} cannot be read; give one number or three, as in 14,4,14."
             ) from None
         return numbers[0] if len(numbers) == 1 else numbers
+    if name == "budget":
+        return _budget(text)
     return text
+
+
+def _budget(text: str) -> dict[str, str]:
+    """`triangles=N,megabytes=M` as an object; BakeSettings judges names and numbers."""
+    parts = [part.partition("=") for part in text.split(",")]
+    if not all(name.strip() and sign and value.strip() for name, sign, value in parts):
+        raise BadInputError(
+            f"--budget {text} cannot be read; give it as in triangles=20000,megabytes=1."
+        )
+    return {name.strip(): value.strip() for name, _, value in parts}
 
 
 def _metavar(name: str, field: FieldInfo) -> str:
     if name == "cell_size":
         return "S|X,Y,Z"
+    if name == "budget":
+        return "triangles=N,megabytes=M"
     if get_origin(field.annotation) is Literal:
         return "|".join(get_args(field.annotation))
     kinds = get_args(field.annotation)

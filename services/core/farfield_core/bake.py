@@ -15,6 +15,7 @@ from farfield_shading import default_light
 
 from farfield_core import layout
 from farfield_core import walk as walk_format
+from farfield_core.budget import within_budget
 from farfield_core.cells import CellGrid, Index, parse_cell_name
 from farfield_core.corridor import Corridor, Ground, cut
 from farfield_core.errors import BadInputError
@@ -48,8 +49,11 @@ def create_bake(
     """Write the manifest of a bake, or find the one written before.
 
     Corridors that follow the ground ask `ground`, which is the prepared scene's own unless given.
+    Settings with a budget stand for those that it leads to.
     Raises BadInputError where corridor and settings do not go together.
     """
+    if settings.budget is not None:
+        settings = within_budget(scene, corridor, settings).settings
     identity = bake_id(scene.id, corridor, settings)
     if store.exists(layout.walk_key(identity)):
         return read_walk(store, identity)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ class Plan(BaseModel):
 
     Attributes:
         cells: number of view cells.
+        cell_size: their edge lengths, metres.
         near_field: half width of the near-field cube, metres.
         layers: number of layers, 0 where quads are slanted.
         megabytes: atlas pages and cell files, 10^6 bytes.
@@ -34,6 +36,7 @@ class Plan(BaseModel):
         kilobytes: atlas pages and file of a cell, 10^3 bytes.
         near_triangles: near triangles listed in a cell, the mean over the corridor.
         most_near_triangles: the same of the cell that has most.
+        why: how a budget was kept; empty without one.
         before: `quads`, `texels`, `kilobytes`, `near_triangles` and `most_near_triangles` without
             visibility.
     """
@@ -41,6 +44,7 @@ class Plan(BaseModel):
     model_config = ConfigDict(frozen=True)
 
     cells: int
+    cell_size: tuple[float, float, float]
     near_field: float
     layers: int
     megabytes: float
@@ -51,6 +55,7 @@ class Plan(BaseModel):
     near_triangles: float
     most_near_triangles: float
     before: dict[str, float]
+    why: str = ""
 
 
 class _Cost(NamedTuple):
@@ -104,21 +109,18 @@ SEEN: dict[str, dict[str, float]] = {
 SEEN_NEAR = 0.56
 #: bytes of a quad in a cell's file, before the server compresses it
 QUAD_BYTES = {"layers": 106.0, "slanted": 144.0}
-#: cells whose near triangles are estimated
+#: cells whose near triangles are estimated, unless asked otherwise
 SAMPLED = 64
 
 
-def plan(scene: SceneInfo, corridor: Corridor, settings: BakeSettings) -> Plan:
-    """Plan a bake; raises BadInputError as `create_bake` would."""
-    size = np.asarray(settings.cell_size, np.float64)
-    if corridor.box is not None:
-        shape = np.array(box_shape(corridor.box, size, corridor.follow_ground))
-        cells = int(shape.prod())
-        centres = _some_of_box(np.asarray(corridor.box.min), shape, size)
-    else:
-        grid = cut(corridor, settings.cell_size)
-        cells = len(grid)
-        centres = _some_of_grid(grid)
+def plan(
+    scene: SceneInfo, corridor: Corridor, settings: BakeSettings, sampled: int = SAMPLED
+) -> Plan:
+    """Plan a bake with just these settings, whatever their budget (`budget.within_budget`).
+
+    Near triangles are those of `sampled` cells. Raises BadInputError as `create_bake` would.
+    """
+    cells, centres = _some_cells(corridor, settings.cell_size, sampled)
     placement = settings.place()
     layers = len(placement.layers)
     inside = near_triangles(scene, centres, settings.near_field * OVERLAP)
@@ -132,6 +134,7 @@ def plan(scene: SceneInfo, corridor: Corridor, settings: BakeSettings) -> Plan:
     kilobytes = _kilobytes(cost, settings)
     return Plan(
         cells=cells,
+        cell_size=settings.cell_size,
         near_field=settings.near_field,
         layers=layers if settings.quads == "layers" else 0,
         megabytes=cells * kilobytes / 1e3,
@@ -177,14 +180,27 @@ def near_triangles(scene: SceneInfo, centres: Floats, half_width: float) -> Floa
     return np.asarray(share @ count)
 
 
-def _some_of_box(low: Floats, shape: NDArray[np.int64], size: Floats) -> Floats:
+@lru_cache(maxsize=4)
+def _some_cells(
+    corridor: Corridor, cell_size: tuple[float, float, float], sampled: int
+) -> tuple[int, Floats]:
+    """Number of cells, and the centres of some of them, (n, 3) float."""
+    size = np.asarray(cell_size, np.float64)
+    if corridor.box is not None:
+        shape = np.array(box_shape(corridor.box, size, corridor.follow_ground))
+        return int(shape.prod()), _some_of_box(np.asarray(corridor.box.min), shape, size, sampled)
+    grid = cut(corridor, cell_size)
+    return len(grid), _some_of_grid(grid, sampled)
+
+
+def _some_of_box(low: Floats, shape: NDArray[np.int64], size: Floats, sampled: int) -> Floats:
     """Centres of some cells of a box, evenly spread: (n, 3) float."""
-    chosen = np.linspace(0, int(shape.prod()) - 1, min(SAMPLED, int(shape.prod()))).astype(np.int64)
+    chosen = np.linspace(0, int(shape.prod()) - 1, min(sampled, int(shape.prod()))).astype(np.int64)
     index = np.stack(np.unravel_index(chosen, tuple(shape.tolist())), axis=1)
     return np.asarray(low + (index + 0.5) * size, np.float64)
 
 
-def _some_of_grid(grid: CellGrid) -> Floats:
+def _some_of_grid(grid: CellGrid, sampled: int) -> Floats:
     """Centres of some cells of a grid, evenly spread: (n, 3) float."""
-    chosen = np.linspace(0, len(grid) - 1, min(SAMPLED, len(grid))).astype(np.int64)
+    chosen = np.linspace(0, len(grid) - 1, min(sampled, len(grid))).astype(np.int64)
     return np.asarray(grid.centres()[chosen], np.float64)

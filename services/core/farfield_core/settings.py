@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from functools import lru_cache
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -11,6 +12,25 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from farfield_core import placement
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class Budget(BaseModel):
+    """What a cell may come to at most; what is left out has no limit."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    triangles: Annotated[int, Field(ge=1)] | None = Field(
+        default=None, description="near triangles of a cell"
+    )
+    megabytes: Positive | None = Field(
+        default=None, description="atlas pages and file of a cell, 10^6 bytes"
+    )
+
+    @model_validator(mode="after")
+    def _has_a_limit(self) -> Budget:
+        if self.triangles is None and self.megabytes is None:
+            raise ValueError("a budget needs triangles, megabytes or both")
+        return self
 
 
 class BakeSettings(BaseModel):
@@ -36,6 +56,11 @@ class BakeSettings(BaseModel):
         default=None,
         description="half width of the near field, metres; with layers it chooses their number, "
         "without it the near field is the one that `layers` layers have",
+    )
+    budget: Budget | None = Field(
+        default=None,
+        description="what a cell may come to at most, triangles=N,megabytes=M or one of them; cell "
+        "size and near border are then chosen so that every cell keeps it",
     )
     alpha: Annotated[float, Field(gt=0, lt=0.7853)] | None = Field(
         default=None,
@@ -116,13 +141,8 @@ class BakeSettings(BaseModel):
 
     def place(self) -> placement.Placement:
         """Layers and borders of every cell under these settings."""
-        count = self.layers
-        if self.near is not None:
-            count = placement.layers_for_near(
-                self.near, self.half_extents, self.resolution, self.alpha, self.gap_texels
-            )
-        return placement.place(
-            self.half_extents, self.resolution, count, self.alpha, self.gap_texels
+        return _place(
+            self.half_extents, self.resolution, self.layers, self.near, self.alpha, self.gap_texels
         )
 
     @property
@@ -136,3 +156,17 @@ class BakeSettings(BaseModel):
         """Hash of the settings that change what a bake contains."""
         text = json.dumps(self.model_dump(mode="json"), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+@lru_cache(maxsize=256)
+def _place(
+    half: tuple[float, float, float],
+    resolution: int,
+    layers: int,
+    near: float | None,
+    alpha: float | None,
+    gap_texels: float | None,
+) -> placement.Placement:
+    if near is not None:
+        layers = placement.layers_for_near(near, half, resolution, alpha, gap_texels)
+    return placement.place(half, resolution, layers, alpha, gap_texels)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from farfield_core.budget import within_budget
 from farfield_core.corridor import read_corridor
-from farfield_core.plan import plan
 from farfield_core.settings import BakeSettings
 
 from farfield.options import (
@@ -32,11 +32,14 @@ def command(scene: str, corridor: Path, store: str, settings: BakeSettings, as_j
     """
     wanted = read_corridor(corridor)
     with borrowed_scene(store, scene) as (_, info):
-        result = plan(info, wanted, settings)
+        result = within_budget(info, wanted, settings).plan
     if as_json:
         print_json(result.model_dump())
         return
+    if result.why:
+        click.echo(result.why)
     click.echo(f"cells        {result.cells}")
+    click.echo(f"cell size    {' x '.join(f'{edge:.4g}' for edge in result.cell_size)} m")
     click.echo(f"near field   {result.near_field:.2f} m")
     click.echo(f"layers       {result.layers}")
     click.echo("Estimates for a cell (in brackets: with nothing hidden left out):")
