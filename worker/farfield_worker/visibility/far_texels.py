@@ -4,8 +4,17 @@ Texels are points on the planes they are drawn on. For each eye they are entered
 as a depth buffer, so near polygons hide them and they hide one another. A texel counts as seen if
 nothing lies before it in its map's texel, or in one of the eight around. A map has at most one
 texel where a face has two each way, so texels that adjoin on a layer leave no holes in it; where
-they do, more is kept. Texels of the next layer hide nothing: surfaces pass from one to the next,
-and LEMI's own removal of hidden texels deals with them (compile/hidden.py).
+they do, more is kept.
+
+An eye between those sampled looks past near things at another angle, and through slits that none of
+them sees through. So near polygons lose a margin of texels before they hide anything: the map then
+stands for all eyes a step away, an occluder's depth times the margin's angle (P. Wonka, M. Wimmer,
+D. Schmalstieg, "Visibility Preprocessing with Occluder Fusion", EGRW 2000, section 3: occluders
+shrunk by the distance between samples). Measured in a street of the medieval town, as shares of the
+far field missing at random eyes: 1.7e-3 without a margin, 5e-4 with it.
+
+Texels of the next layer hide nothing: surfaces pass from one to the next, and LEMI's own removal of
+hidden texels deals with them (compile/hidden.py).
 """
 
 from __future__ import annotations
@@ -22,6 +31,8 @@ from farfield_worker.visibility.near_maps import NearMap, farthest_around
 
 Floats = NDArray[np.float64]
 
+#: texels of a map that near polygons lose all around
+MARGIN = 4
 #: of each face, which coordinates run right and down, (6, 2) int, and which way, (6, 2) float32
 _ALONG = np.array([[abs(f.right).argmax(), abs(f.down).argmax()] for f in FACES])
 _SIGN = np.array([[f.right.sum(), f.down.sum()] for f in FACES], np.float32)
@@ -48,7 +59,7 @@ class FarTexels:
 
     def look(self, eye: Floats, maps: Sequence[NearMap]) -> float:
         """See `sampling.Watcher`."""
-        nearest = np.stack([near_map.solid for near_map in maps])
+        nearest = np.stack([farthest_around(near_map.solid, MARGIN) for near_map in maps])
         resolution = nearest.shape[1]
         flat = nearest.reshape(-1)
         seen_from = (np.asarray(eye, np.float64) - self._base).astype(np.float32)
