@@ -12,6 +12,7 @@ from farfield_worker.slanted.painter import QuadPainter
 from farfield_worker.slanted.quads import limit_corners
 from farfield_worker.slanted.residual import (
     CROWD,
+    corners,
     far_texels,
     residual_texels,
 )
@@ -171,6 +172,23 @@ def test_residual_texels_by_loops() -> None:
     )
     assert 0 < crowded.sum() < missing.sum()
     assert np.array_equal(got, want)
+
+
+def test_corners_start_with_a_tetrahedron_that_neighbours_share() -> None:
+    half = np.array([2.0, 1.0, 3.0])
+    middle = np.array([0.3, 10.2, -7.1])
+    for axis in range(3):
+        both = []
+        for step in (0.0, 2.0):
+            centre = middle + step * half * np.eye(3)[axis]
+            found = corners(centre, half)
+            assert len({tuple(c) for c in found}) == 8
+            assert (np.abs(found) == half).all()
+            first = found[:4]
+            edges = np.linalg.norm((first[:, None] - first[None]) / half, axis=2)
+            assert np.allclose(edges[~np.eye(4, dtype=bool)], 8**0.5), "no two lie on an edge"
+            both.append({tuple(np.round(centre + c, 6)) for c in first})
+        assert len(both[0] & both[1]) == 2
 
 
 @pytest.mark.usefixtures("graphics")

@@ -7,7 +7,8 @@ from farfield_worker.slanted.clip import (
     clip_half_plane,
     clip_to_range,
     disparity_range,
-    grown_rectangle,
+    grown_rectangles,
+    untouched,
 )
 from farfield_worker.slanted.fill import SheetTexels, fill
 from farfield_worker.slanted.fit import fit_plane
@@ -229,8 +230,9 @@ def test_clipped_quads_keep_their_texels_and_have_no_spikes(seen: Seen) -> None:
     )
     captured = ~texels.filled
     sheet = np.repeat(np.arange(len(sheets.rect)), np.diff(texels.starts))
+    rectangles = grown_rectangles(texels.rect)
     for s, plane in enumerate(sheets.plane):
-        polygon = clip_to_range(grown_rectangle(texels.rect[s]), plane, low[s], high[s], RESOLUTION)
+        polygon = clip_to_range(rectangles[s], plane, low[s], high[s], RESOLUTION)
         assert 3 <= len(polygon) <= 6
         d = (
             plane[0] * (2 * polygon[:, 0] / RESOLUTION - 1)
@@ -330,3 +332,21 @@ def test_edge_on_triangles_have_no_plane() -> None:
     assert planes.high[1] == pytest.approx(1 / 10)
     behind = triangle_planes(4, np.zeros(3), -corners)
     assert np.isinf(behind.high).all()
+
+
+def test_what_needs_no_clipping_is_what_clipping_leaves_alone() -> None:
+    rng = np.random.default_rng(5)
+    corner = rng.integers(0, RESOLUTION - 8, (400, 2))
+    rects = np.hstack([corner, corner + rng.integers(1, 8, (400, 2))]).astype(np.int32)
+    planes = rng.normal(size=(400, 3)) * (0.05, 0.05, 0.0) + (0.0, 0.0, 0.1)
+    low, high = rng.uniform(0.0, 0.08, 400), rng.uniform(0.1, 0.2, 400)
+    planes_of_walls = walls(4, np.array([1.0, -0.5, 2.0]), 8.0)
+    polygons = grown_rectangles(rects)
+    whole = untouched(polygons, planes, low, high, planes_of_walls, RESOLUTION)
+    for s in range(400):
+        clipped = clip_to_range(polygons[s], planes[s], low[s], high[s], RESOLUTION)
+        parts = split(polygons[s], planes[s], planes_of_walls, RESOLUTION)
+        alone = len(parts) == 1 and np.array_equal(parts[0][1], planes[s])
+        same = clipped.shape == (4, 2) and np.array_equal(clipped, polygons[s])
+        assert whole[s] == (same and alone)
+    assert 50 < whole.sum() < 350

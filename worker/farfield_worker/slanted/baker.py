@@ -20,7 +20,7 @@ from farfield_worker.slanted.near_border import walls
 from farfield_worker.slanted.painter import QuadPainter
 from farfield_worker.slanted.planes import seeds
 from farfield_worker.slanted.quads import face_quads, texel_points
-from farfield_worker.slanted.residual import EyeQuads, residual_quads
+from farfield_worker.slanted.residual import EyeQuads, corners, residual_quads
 from farfield_worker.slanted.segment import SegmentSettings
 from farfield_worker.slanted.tolerance import DEFAULT_FACTOR, Tolerance
 from farfield_worker.visibility.clusters import Clusters
@@ -36,8 +36,6 @@ Floats = NDArray[np.float64]
 Watch = Callable[[str], AbstractContextManager[None]]
 #: shows what the cell's eyes see to the watchers given
 Look = Callable[[Sequence[Watcher]], None]
-
-_CORNERS = slice(1, 9)
 
 
 @dataclass(frozen=True)
@@ -155,17 +153,19 @@ class SlantedBaker:
         look: Look | None,
     ) -> dict[int, Fragments]:
         """Fragments that some eye of the cell can see, and what continues them."""
-        points, slack = [], []
+        places, slack = [], []
         for face, here in fragments.items():
-            points.append(centre + texel_points(face, here.texel, here.disparity, self.resolution))
+            places.append(texel_points(face, here.texel, here.disparity, self.resolution))
             high = self._tolerance(face, settings).interval(here.disparity)[1]
             slack.append(high - here.disparity)
+        points = np.concatenate(places)
+        points += centre
         if look is None:
             eyes = cell_eyes(centre, np.asarray(settings.half_extents))
-            known = seen(np.concatenate(points), np.concatenate(slack), eyes, self.maps)
+            known = seen(points, np.concatenate(slack), eyes, self.maps)
         else:
             disparity = np.concatenate([here.disparity for here in fragments.values()])
-            far = FarTexels(np.concatenate(points), np.concatenate(slack) / disparity)
+            far = FarTexels(points, np.concatenate(slack) / disparity)
             look([far])
             known = far.seen
         ends = np.cumsum([len(f.texel) for f in fragments.values()])
@@ -192,7 +192,7 @@ class SlantedBaker:
             self._painter,
             centre,
             half,
-            cell_eyes(np.zeros(3), half)[_CORNERS],
+            corners(centre, half),
             settings.faces,
             settings.alpha,
             settings.near,

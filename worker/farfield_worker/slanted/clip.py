@@ -54,11 +54,11 @@ def disparity_range(
     return np.maximum(low, 0.0), high
 
 
-def grown_rectangle(rect: Ints) -> Floats:
-    """Corners of `rect` (4,), grown by GROWTH: (4, 2) float, texels, in turn."""
-    x0, y0 = rect[0] - GROWTH, rect[1] - GROWTH
-    x1, y1 = rect[2] + GROWTH, rect[3] + GROWTH
-    return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+def grown_rectangles(rects: Ints) -> Floats:
+    """Corners of `rects` (n, 4), grown by GROWTH: (n, 4, 2) float, texels, in turn."""
+    x0, y0 = (rects[:, :2] - GROWTH).T
+    x1, y1 = (rects[:, 2:] + GROWTH).T
+    return np.stack([x0, y0, x1, y0, x1, y1, x0, y1], axis=1).reshape(-1, 4, 2)
 
 
 def clip_half_plane(polygon: Floats, line: Floats) -> Floats:
@@ -97,3 +97,24 @@ def clip_to_range(
     if len(polygon) and (polygon @ above[:2] + above[2]).min() < 0:
         polygon = clip_half_plane(polygon, above)
     return polygon
+
+
+def untouched(
+    polygons: Floats, planes: Floats, low: Floats, high: Floats, walls: Floats, resolution: int
+) -> NDArray[np.bool_]:
+    """Polygons (n, k, 2), texels, that need no clipping: (n,) bool.
+
+    Their `planes` (n, 3) stay within [low, high], (n,) each, and beyond one of `walls` (m, 3).
+    """
+
+    def at_corners(over: Floats) -> Floats:
+        a, b, c = 2 * over[:, :1] / resolution, 2 * over[:, 1:2] / resolution, over[:, 2:]
+        return np.asarray(
+            a * polygons[..., 0] + b * polygons[..., 1] + c - over[:, :2].sum(1)[:, None]
+        )
+
+    d = at_corners(planes)
+    beyond = np.zeros(len(polygons), np.bool_)
+    for wall in walls:
+        beyond |= (d <= at_corners(wall[None])).all(axis=1)
+    return np.asarray(beyond & (d.min(axis=1) >= low) & (d.max(axis=1) <= high))

@@ -36,8 +36,18 @@ class Grid(NamedTuple):
 
 def texel_starts(texel: Ints, resolution: int) -> Ints:
     """First fragment of each texel, (resolution^2 + 1,) int32, for `texel` (n,) in order."""
-    starts = np.searchsorted(texel, np.arange(resolution * resolution + 1))
-    return starts.astype(np.int32)
+    starts = np.zeros(resolution * resolution + 1, np.int32)
+    _count(texel, starts)
+    return starts
+
+
+@njit(cache=True)
+def _count(texel: Any, starts: Any) -> None:
+    """Write to `starts` how many of `texel`, in order, come before each texel."""
+    for t in texel:
+        starts[t + 1] += 1
+    for t in range(1, len(starts)):
+        starts[t] += starts[t - 1]
 
 
 @njit(cache=True)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from farfield_core.faces import directions, texel_centres
+from farfield_core.faces import FACES, texel_centres
+from numba import njit
 from numpy.typing import NDArray
 
 from farfield_worker.slanted.clip import (
     clip_to_range,
     disparity_range,
-    grown_rectangle,
+    grown_rectangles,
+    untouched,
 )
 from farfield_worker.slanted.fill import SheetTexels, fill
 from farfield_worker.slanted.fragments import Fragments
@@ -90,15 +92,21 @@ def face_quads(
     low2, high2 = tolerance.interval(disparity, 2.0)
     starts = texel_starts(fragments.texel, resolution)
     texels = fill(sheets, starts, disparity, low2, high2, resolution)
-    nearest, farthest = disparity_range(texels, disparity, seed, triangles, tolerance, resolution)
+    farthest, nearest = disparity_range(texels, disparity, seed, triangles, tolerance, resolution)
     dips = _dips(sheets, u, v, walls)
     sheet, polygons, planes = [], [], []
+    rectangles = grown_rectangles(texels.rect)
+    whole = untouched(rectangles, sheets.plane, farthest, nearest, walls, resolution)
     for s, plane in enumerate(sheets.plane):
-        rectangle = grown_rectangle(texels.rect[s])
-        whole = clip_to_range(rectangle, plane, nearest[s], farthest[s], resolution)
-        if len(whole) < 3:
+        if whole[s]:
+            sheet.append(s)
+            polygons.append(rectangles[s])
+            planes.append(plane)
             continue
-        for part, part_plane in split(whole, plane, walls, resolution, cut=not dips[s]):
+        clipped = clip_to_range(rectangles[s], plane, farthest[s], nearest[s], resolution)
+        if len(clipped) < 3:
+            continue
+        for part, part_plane in split(clipped, plane, walls, resolution, cut=not dips[s]):
             for polygon in limit_corners(part):
                 sheet.append(s)
                 polygons.append(polygon)
@@ -136,8 +144,21 @@ def texel_points(
     face: int, texel: Ints, disparity: NDArray[np.floating], resolution: int
 ) -> Floats:
     """Points seen at `texel` (n,) of `face` with `disparity` (n,), relative to the eye: (n, 3)."""
-    u, v = texel_uv(texel, resolution)
-    return directions(face, u, v) / disparity.astype(np.float64)[:, None]
+    axes = FACES[face]
+    points = np.empty((len(texel), 3))
+    frame = np.stack([axes.right, axes.down, axes.forward]).astype(np.float64)
+    _points(texel, disparity, frame, resolution, points)
+    return points
+
+
+@njit(cache=True)
+def _points(texel: Any, disparity: Any, axes: Any, resolution: int, points: Any) -> None:
+    size = 2.0 / resolution
+    for i in range(len(texel)):
+        u = (texel[i] % resolution + 0.5) * size - 1.0
+        v = (texel[i] // resolution + 0.5) * size - 1.0
+        for a in range(3):
+            points[i, a] = (axes[2, a] + u * axes[0, a] + v * axes[1, a]) / disparity[i]
 
 
 def sheet_images(

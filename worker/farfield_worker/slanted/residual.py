@@ -10,10 +10,15 @@ Missing is a texel of the far field that
 
 Single stray texels are edges sampled differently, so at least three in a neighbourhood count; what
 is left is dilated by one texel, which laps it over its surroundings.
+
+Corners of neighbouring cells are corners of one lattice. Each cell starts with the four at which
+the lattice's steps add up to an even number: a tetrahedron, of which neighbours share two corners.
+The other four follow only where the last one looked from still found much.
 """
 
 from __future__ import annotations
 
+import itertools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,6 +42,10 @@ Mask = NDArray[np.bool_]
 CROWD = 3
 #: texels that a residual sheet needs
 LEAST = 4
+#: eyes that are always looked from
+FIRST = 4
+#: share of an eye's far texels that must be missing for others to follow the first ones
+MUCH = 0.05
 #: relative difference of disparity between two rasterisers' idea of one surface
 SAME = 1e-3
 
@@ -64,6 +73,16 @@ def residual_texels(
     return result
 
 
+def corners(centre: Floats, half_extents: Floats) -> Floats:
+    """Corners of the cell around `centre` (3,), relative to it, even ones first: (8, 3) float."""
+    half = np.asarray(half_extents, np.float64)
+    offsets = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * half
+    # any shift of the lattice will do if no corner lies where rounding turns
+    steps = np.floor((centre + offsets) / (2 * half) + 0.318)
+    odd = steps.sum(axis=1) % 2
+    return np.asarray(offsets[np.argsort(odd, kind="stable")])
+
+
 def residual_quads(
     scene: PreparedScene,
     renderer: DepthMapRenderer,
@@ -80,11 +99,17 @@ def residual_quads(
 ) -> list[EyeQuads]:
     """Quads that mend what `painter` leaves out as seen from `eyes` (k, 3), relative to `centre`.
 
+    The eyes are looked from in turn, those beyond the first FIRST only while there is need.
+
     `painter` holds the quads so far and gets the new ones; `maps` are those of `renderer`.
     """
     found = []
-    for eye in eyes:
+    share = 1.0
+    for number, eye in enumerate(eyes):
+        if number >= FIRST and share < MUCH:
+            break
         new = []
+        looked = absent = 0
         for face in faces:
             truth = maps.map(centre + eye, face)
             far = far_texels(truth, face, eye, near)
@@ -94,6 +119,7 @@ def residual_quads(
             wall_planes = walls(face, eye, near)
             shown = painter.draw(face, eye)
             missing = residual_texels(truth, shown, tolerance, far)
+            looked, absent = looked + int(far.sum()), absent + int(missing.sum())
             if not missing.any():
                 continue
             fragments = residual_fragments(renderer, centre + eye, face, truth, missing)
@@ -110,6 +136,7 @@ def residual_quads(
             )
             if len(quads.sheet):
                 new.append(EyeQuads(eye, face, quads))
+        share = absent / max(looked, 1)
         for part in new:
             painter.add(part.face, part.eye, part.quads)
         found.extend(new)

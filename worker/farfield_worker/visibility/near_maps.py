@@ -184,8 +184,11 @@ class NearMapRenderer:
         return data.reshape(self.resolution, self.resolution, 2)
 
 
-def farthest_around(disparity: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Least disparity in the 3 x 3 texels around each of a map (h, w): (h, w) float32."""
-    grown = np.pad(disparity, 1, mode="edge")
-    rows = np.minimum(np.minimum(grown[:-2], grown[1:-1]), grown[2:])
-    return np.minimum(np.minimum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:])
+def farthest_around(disparity: NDArray[np.float32], texels: int = 1) -> NDArray[np.float32]:
+    """Least disparity within `texels` of each texel of a map (h, w), both ways: (h, w) float32."""
+    around = disparity
+    for _ in range(texels):
+        grown = np.pad(around, 1, mode="edge")
+        rows = np.minimum(np.minimum(grown[:-2], grown[1:-1]), grown[2:])
+        around = np.minimum(np.minimum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:])
+    return around

@@ -47,7 +47,7 @@ class Effort(NamedTuple):
 
 EFFORTS: dict[Literal["fast", "on", "careful"], Effort] = {
     "fast": Effort(scale=0.5, most=FIXED, target=1.0),
-    "on": Effort(scale=0.5, most=32, target=2e-5),
+    "on": Effort(scale=0.5, most=24, target=5e-5),
     "careful": Effort(scale=1.0, most=400, target=1e-6),
 }
 

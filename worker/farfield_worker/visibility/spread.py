@@ -17,7 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from farfield_worker.slanted.grid import texel_starts
-from farfield_worker.slanted.tolerance import Tolerance
+from farfield_worker.slanted.tolerance import Tolerance, highest, lowest
 
 Mask = NDArray[np.bool_]
 
@@ -38,30 +38,33 @@ def spread(
     `texel` (n,), sorted, and `disparity` (n,), 1/m, are the fragments'; a step leads to any of the
     nine texels around.
     """
-    d = disparity.astype(np.float64)
-    low, high = tolerance.interval(d, STEP)
     starts = texel_starts(texel, resolution)
     result = seen.copy()
+    front = np.flatnonzero(seen).astype(np.int32)
     for _ in range(texels):
-        result = _step(texel, starts, d, low, high, result, resolution)
+        front = _step(texel, starts, disparity, tolerance.steps(STEP), front, result, resolution)
     return result
 
 
 @njit(cache=True)
 def _step(
-    texel: Any, starts: Any, disparity: Any, low: Any, high: Any, seen: Any, resolution: int
+    texel: Any, starts: Any, disparity: Any, steps: Any, front: Any, seen: Any, resolution: int
 ) -> Any:
-    """Fragments that are seen or next to one that is."""
-    grown = seen.copy()
-    for i in range(len(texel)):
-        if seen[i]:
-            continue
+    """Mark in `seen` the fragments next to those of `front` (m,); return the new ones."""
+    new = np.empty(len(seen), np.int32)
+    count = 0
+    for i in front:
         x, y = texel[i] % resolution, texel[i] // resolution
         for ny in range(max(y - 1, 0), min(y + 2, resolution)):
             # the fragments of up to three neighbouring texels lie in one run
             first = starts[ny * resolution + max(x - 1, 0)]
             end = starts[ny * resolution + min(x + 1, resolution - 1) + 1]
             for j in range(first, end):
-                if seen[j] and low[i] <= disparity[j] <= high[i]:
-                    grown[i] = True
-    return grown
+                if seen[j]:
+                    continue
+                d = float(disparity[j])
+                if lowest(d, steps) <= disparity[i] <= highest(d, steps):
+                    seen[j] = True
+                    new[count] = j
+                    count += 1
+    return new[:count].copy()
