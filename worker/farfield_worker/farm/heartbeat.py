@@ -103,6 +103,8 @@ class Heartbeat:
             self._board.leave(self._slot)
 
     def _run(self) -> None:
+        # at once: whoever decides by who lives must not overlook a fresh worker
+        self._beat()
         while not self._closed.wait(BEAT):
             self._beat()
 
