@@ -57,7 +57,8 @@ def s3(tmp_path_factory: pytest.TempPathFactory) -> Iterator[S3Server | MotoServ
 
 @pytest.fixture
 def faults(s3: S3Server | MotoServer) -> Iterator[Faults]:
-    proxy = Faults(s3.port)
+    # clients wait for 10 s
+    proxy = Faults(s3.port, silence=30 if SOAK else 3)
     yield proxy
     proxy.close()
 
@@ -89,7 +90,9 @@ def assert_done(farm: Farm, walk: Walk, dispatcher: CeleryDispatcher) -> None:
 
 def test_workers_killed_again_and_again(farm: Farm) -> None:
     walk, dispatcher = begun(farm, patience=5.0)
-    workers = [farm.worker(1, **{"*": CELL}) for _ in range(2)]
+    workers = [farm.worker(1, wait=False, **{"*": CELL}) for _ in range(2)]
+    for worker in workers:
+        farm.ready(worker)
     kills = 0
     while dispatcher.status(walk.id).state != "done" and (SOAK or kills < 4):
         if SOAK:

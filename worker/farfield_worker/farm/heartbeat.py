@@ -89,6 +89,8 @@ class Heartbeat:
                 done=self._slot.done + done,
                 tried=self._slot.tried + tried,
             )
+        if self._orders.cancelled:  # somebody waits to see it end
+            self._beat()
 
     def report(self, bake: str, report: Report) -> None:
         """Tell what became of a cell; if nobody hears, the store will tell."""

@@ -30,7 +30,7 @@ from farfield.target import prepared_scene
 @click.option(
     "--follows",
     metavar="BAKE",
-    help="A bake of the scene before it was edited: cells are reused where the edit cannot be seen.",
+    help="A bake of the scene before an edit: cells are reused where the edit cannot be seen.",
 )
 @settings_options()
 @jobs_option
