@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import io
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -88,20 +89,23 @@ def write_city(path: Path, triangles: int = TRIANGLES) -> CityFacts:
 
     The file appears only when it is whole. The number written is within 2 % of the wish.
     """
-    images = textures()
+    _check(triangles)
+    with ThreadPoolExecutor(1) as beside:
+        # mostly large arrays, which leave the interpreter to the other thread
+        drawing = beside.submit(_pictures)
+        parts, districts = _districts(triangles)
+        images, pictures = drawing.result()
     writer = GlbWriter("Farfield demo city")
     for material in Material:
-        image = images.get(material)
         writer.material(
             material.name.lower(),
-            None if image is None else _png(image, material),
+            pictures.get(material),
             mask=material == Material.FOLIAGE,
             double_sided=material in _DOUBLE_SIDED,
         )
     digest = CityHash(images)
     total, vertices = 0, 0
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    parts, districts = _districts(triangles)
     for name, primitives in districts:
         collected = []
         for primitive in primitives:
@@ -122,6 +126,19 @@ def city_primitives(triangles: int = TRIANGLES) -> Iterator[Primitive]:
         yield from primitives
 
 
+def _check(triangles: int) -> None:
+    if not LEAST <= triangles <= MOST:
+        raise BadInputError(
+            f"The demo city has between {LEAST:,} and {MOST:,} triangles, not {triangles:,}."
+        )
+
+
+def _pictures() -> tuple[dict[Material, NDArray[np.uint8]], dict[Material, bytes]]:
+    """All textures, and the files that they become."""
+    images = textures()
+    return images, {material: _png(image, material) for material, image in images.items()}
+
+
 @lru_cache(maxsize=1)
 def _city() -> City:
     return build()
@@ -130,10 +147,7 @@ def _city() -> City:
 def _districts(
     triangles: int,
 ) -> tuple[dict[str, int], Iterator[tuple[str, Iterator[Primitive]]]]:
-    if not LEAST <= triangles <= MOST:
-        raise BadInputError(
-            f"The demo city has between {LEAST:,} and {MOST:,} triangles, not {triangles:,}."
-        )
+    _check(triangles)
     city = _city()
     table, nu, nv, counts = select(city, triangles)
     return counts, _walk_districts(city.map, table, nu, nv)
