@@ -45,6 +45,7 @@ class Farm:
         self._folder = folder
         self._environment = environment or {}
         self._stack = ExitStack()
+        self._logs: dict[int, Path] = {}
 
     def __enter__(self) -> Farm:
         return self
@@ -62,6 +63,18 @@ class Farm:
     ) -> subprocess.Popen[bytes]:
         """Start a worker; `fake` maps c<i>_<j>_<k>, and `*`, to what happens there (farm_cell)."""
         return self._stack.enter_context(self._worker(jobs, env or {}, wait, fake))
+
+    def workers(self, count: int, env: dict[str, str] | None = None, **fake: Any) -> None:
+        """Start workers of one process each, side by side, and wait until all are ready."""
+        started = [self.worker(1, env, wait=False, **fake) for _ in range(count)]
+        for process in started:
+            self.ready(process)
+
+    def ready(self, worker: subprocess.Popen[bytes]) -> None:
+        """Wait until a worker takes cells."""
+        log = self._logs[worker.pid]
+        until(lambda: b"ready." in log.read_bytes() or worker.poll() is not None, "a worker")
+        assert worker.poll() is None, log.read_text()
 
     @contextmanager
     def _worker(
@@ -85,9 +98,9 @@ class Farm:
                 start_new_session=True,
             )
         try:
+            self._logs[process.pid] = log
             if wait:
-                until(lambda: b"ready." in log.read_bytes() or process.poll() is not None)
-                assert process.poll() is None, log.read_text()
+                self.ready(process)
             yield process
         finally:
             kill(process)

@@ -9,6 +9,8 @@ from farfield_worker.farm import celery_app
 from farfield_worker.farm.bakers import Limits
 
 TESTS = Path(__file__).parents[1]
+#: seconds without a sign of life, instead of 10: tests wait for it
+LOST = 4
 CELL = (sys.executable, str(TESTS / "integration/farm_cell.py"))
 
 if __name__ == "__main__":
@@ -17,5 +19,5 @@ if __name__ == "__main__":
     celery_app.prepare_scene = lambda store, scene: prepare_scene(store, scene, fake)
     jobs = int(sys.argv[3]) if len(sys.argv) > 3 else 2
     limits = Limits.from_environment(os.environ, jobs)
-    worker = celery_app.create_worker(sys.argv[1], sys.argv[2], CELL, limits=limits)
+    worker = celery_app.create_worker(sys.argv[1], sys.argv[2], CELL, limits=limits, lost=LOST)
     celery_app.run_worker(worker, jobs)

@@ -149,10 +149,11 @@ def s3_environment(endpoint: str) -> dict[str, str]:
 class Faults:
     """A proxy before an S3 server: a share of requests fails, and all while it is `gone`.
 
-    A third fails before it reaches the server, a third after, and a third is not answered at all.
+    A third fails before it reaches the server, a third after, and a third is not answered at all,
+    but cut off after `silence` seconds.
     """
 
-    def __init__(self, port: int, share: float = 0.0, seed: int = 1) -> None:
+    def __init__(self, port: int, share: float = 0.0, seed: int = 1, silence: float = 30.0) -> None:
         self.share = share
         self.gone = False
         self.requests = self.faults = 0
@@ -183,7 +184,7 @@ class Faults:
                 if fault == "after":
                     self._answer(500, [], b"")
                 elif fault == "silence":
-                    faults._closing.wait(30)
+                    faults._closing.wait(silence)
                     self.close_connection = True
                 else:
                     self._answer(status, headers, content)

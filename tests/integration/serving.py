@@ -1,5 +1,6 @@
 """An API over a store in a folder whose cells and scenes are made by small stand-ins."""
 
+import inspect
 import json
 import sys
 import time
@@ -56,11 +57,13 @@ def client_over(folder: Path, **how: Any) -> Iterator[TestClient]:
         yield client
 
 
-def until(condition: Callable[[], Any]) -> Any:
-    """Wait until something is true, and return it."""
-    end = time.monotonic() + 120
+def until(condition: Callable[[], Any], what: str = "", seconds: float = 120) -> Any:
+    """Wait until something is true, and return it; says what it waited for in vain."""
+    end = time.monotonic() + seconds
     while not (value := condition()):
-        assert time.monotonic() < end, "waited in vain"
+        if time.monotonic() > end:
+            what = what or inspect.getsource(condition).strip()
+            raise AssertionError(f"waited {seconds:g} s in vain for {what}")
         time.sleep(0.02)
     return value
 

@@ -5,11 +5,19 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from farfield_core.bake import done_cells
+from farfield_core.bake import done_cells, predecessor
 from farfield_core.store import Store
 from fastapi.testclient import TestClient
 
-from tests.integration.serving import client_over, problem, row, start_bake, state, until
+from tests.integration.serving import (
+    client_over,
+    problem,
+    ready_scene,
+    row,
+    start_bake,
+    state,
+    until,
+)
 from tests.unit.walks import row_of_cells
 
 
@@ -174,3 +182,14 @@ def test_ids_are_checked_before_anything_is_looked_up(slow: TestClient) -> None:
 
 def test_baking_needs_a_prepared_scene(slow: TestClient) -> None:
     problem(slow.post("bakes", json={"scene": "nosuchscene", "corridor": row(1)}), 404)
+
+
+def test_a_bake_may_follow_one_of_the_scene_before_an_edit(store: Path) -> None:
+    with client_over(store) as client:
+        first = start_bake(client)
+        body = {"scene": ready_scene(client), "corridor": row(4), "settings": {"layers": 5}}
+        second = client.post("bakes", json={**body, "follows": first}).json()["id"]
+        assert predecessor(Store.open(store), second) == first
+        answer = client.post("bakes", json={**body, "follows": "0" * 16})
+        assert problem(answer, 404) == f"There is no bakes/{'0' * 16}/walk.json in the store."
+        assert client.post("bakes", json={**body, "follows": "../"}).status_code == 422

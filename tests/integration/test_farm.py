@@ -1,7 +1,6 @@
 """The farm with a real Redis and real workers: what it bakes, in which order, and how it stops."""
 
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -65,25 +64,22 @@ def test_every_cell_is_baked_once(farm: Farm) -> None:
 def test_poison_fails_alone_and_says_why(farm: Farm) -> None:
     walk = row_of_cells(farm.store, 8)
     poison = {"c1_0_0": "error", "c2_0_0": "crash", "c3_0_0": "hang", "c4_0_0": "fill"}
-    limits = {"FARFIELD_CELL_SECONDS": "6", "FARFIELD_CELL_MEGABYTES": "250"}
-    for _ in range(3):
-        farm.worker(1, limits, **poison)
-    dispatcher, events = farm.feeder()
+    limits = {"FARFIELD_CELL_SECONDS": "3", "FARFIELD_CELL_MEGABYTES": "250"}
+    farm.workers(3, limits, **poison)
+    dispatcher, events = farm.feeder(patience=5.0)
     dispatcher.submit(walk.id)
     status = dispatcher.wait(walk.id, timeout=90)
     assert (status.state, status.done, status.failed) == ("failed", 4, 4)
     assert sorted(status.reasons) == ["1_0_0", "2_0_0", "3_0_0", "4_0_0"]
     assert "The cell is cursed." in status.reasons["1_0_0"]
     assert "killed by SIGSEGV; its last words: the driver gave up" in status.reasons["2_0_0"]
-    assert "The process gave no answer for 6 s." in status.reasons["3_0_0"]
+    assert "The process gave no answer for 3 s." in status.reasons["3_0_0"]
     assert "The process took more than 250 MB of memory." in status.reasons["4_0_0"]
-    # a worker that is too busy to be seen for a while may get a cell twice
-    wrong = [why for why in status.reasons.values() if not re.search(r"[34] times by 3 w", why)]
-    assert wrong == []
-    assert all(farm.attempts()[f"{i}_0_0"] in (3, 4) for i in (1, 2, 3, 4))
+    assert all("(tried 3 times by 3 workers)" in why for why in status.reasons.values())
+    assert all(farm.attempts()[f"{i}_0_0"] == 3 for i in (1, 2, 3, 4))
     assert all(farm.attempts()[f"{i}_0_0"] == 1 for i in (0, 5, 6, 7))
     retried = [event.cell for event in events if event.kind == "retried"]
-    assert set(retried) == {f"{i}_0_0" for i in (1, 2, 3, 4)}
+    assert Counter(retried) == Counter({f"{i}_0_0": 2 for i in (1, 2, 3, 4)})
     assert dispatcher.aside() == {}
 
 
@@ -102,9 +98,10 @@ def test_where_there_is_one_worker_it_tries_three_times(farm: Farm) -> None:
 
 
 def test_a_worker_that_fails_what_others_bake_is_set_aside(farm: Farm) -> None:
-    walk = row_of_cells(farm.store, 20)
-    farm.worker(1, **{"*": "error"})
-    farm.worker(1, **{"*": "0.2"})
+    walk = row_of_cells(farm.store, 12)
+    bad, good = (farm.worker(1, wait=False, **{"*": act}) for act in ("error", "0.2"))
+    farm.ready(bad)
+    farm.ready(good)
     dispatcher, _ = farm.feeder()
     dispatcher.submit(walk.id)
     assert dispatcher.wait(walk.id, timeout=60).state == "done"
@@ -160,7 +157,7 @@ def _children_of(process: int) -> list[int]:
 
 def test_a_worker_told_to_stop_finishes_its_cells(farm: Farm) -> None:
     walk = row_of_cells(farm.store, 6)
-    worker = farm.worker(**{"*": 1.5})
+    worker = farm.worker(**{"*": 0.8})
     dispatcher, _ = farm.feeder()
     dispatcher.submit(walk.id)
     until(lambda: len(farm.attempts()) == 2)
@@ -279,15 +276,15 @@ def test_an_api_of_a_farm(farm: Farm, tmp_path: Path) -> None:
 
 def test_the_command_says_whether_a_worker_answers(farm: Farm) -> None:
     command = [sys.executable, "-m", "farfield", "worker", "--ping", "--broker", farm.broker]
-    alone = subprocess.run(command, capture_output=True, text=True, check=False)
+    alone = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
     assert alone.returncode != 0
     assert alone.stderr == "No worker on this machine answers.\n"
     farm.worker()
-    until(lambda: subprocess.run(command, check=False).returncode == 0)
+    until(lambda: subprocess.run(command, check=False, timeout=60).returncode == 0)
 
 
 def test_a_worker_needs_a_broker() -> None:
     command = [sys.executable, "-m", "farfield", "worker", "--broker", ""]
-    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    answer = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
     assert answer.returncode == 2
     assert "--broker" in answer.stderr

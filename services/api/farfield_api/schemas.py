@@ -157,6 +157,8 @@ class BakeRequest(BaseModel):
     #: a corridor file's content, or the id of one sent before
     corridor: Corridor | Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
     settings: BakeSettings = BakeSettings()
+    #: a bake of the scene before it was edited: cells are reused where the edit cannot be seen
+    follows: Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")] | None = None
 
 
 class NewBake(BaseModel):

@@ -113,8 +113,13 @@ class FarfieldService:
         self.ready_scene(scene)
         return suggest_corridor(core_scenes.open_prepared(self.store, scene))
 
-    def create_bake(self, scene: str, corridor: Corridor, settings: BakeSettings) -> str:
-        """Write a bake's manifest and have it baked; returns its id."""
+    def create_bake(
+        self, scene: str, corridor: Corridor, settings: BakeSettings, follows: str | None = None
+    ) -> str:
+        """Write a bake's manifest and have it baked; returns its id.
+
+        Cells of the bake `follows` are reused where nothing else would come out.
+        """
         info = self.ready_scene(scene)
         most = self.settings.quota_cells
         if most and (cells := within_budget(info, corridor, settings).plan.cells) > most:
@@ -122,7 +127,7 @@ class FarfieldService:
                 f"The corridor has {cells} cells, more than the {most} that this server bakes in "
                 "one go; make it smaller, or its cells larger."
             )
-        walk = create_bake(self.store, info, corridor, settings)
+        walk = create_bake(self.store, info, corridor, settings, follows=follows)
         self.bakes.start(walk.id)
         return walk.id
 

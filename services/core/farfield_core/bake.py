@@ -18,7 +18,7 @@ from farfield_core import walk as walk_format
 from farfield_core.budget import within_budget
 from farfield_core.cells import CellGrid, Index, parse_cell_name
 from farfield_core.corridor import Corridor, Ground, cut
-from farfield_core.errors import BadInputError
+from farfield_core.errors import BadInputError, NotFoundError
 from farfield_core.ground import ground_under
 from farfield_core.placement import Placement
 from farfield_core.scene import SceneInfo
@@ -45,16 +45,22 @@ def create_bake(
     corridor: Corridor,
     settings: BakeSettings,
     ground: Ground | None = None,
+    follows: str | None = None,
 ) -> Walk:
     """Write the manifest of a bake, or find the one written before.
 
     Corridors that follow the ground ask `ground`, which is the prepared scene's own unless given.
     Settings with a budget stand for those that it leads to.
-    Raises BadInputError where corridor and settings do not go together.
+    Cells of the bake `follows`, of the scene before an edit, are carried over where the edit does
+    not show. Raises NotFoundError where there is no such bake, and BadInputError where corridor and
+    settings do not go together.
     """
     if settings.budget is not None:
         settings = within_budget(scene, corridor, settings).settings
     identity = bake_id(scene.id, corridor, settings)
+    if follows is not None and follows != identity:
+        read_walk(store, follows)
+        store.put(layout.predecessor_key(identity), json.dumps({"bake": follows}).encode())
     if store.exists(layout.walk_key(identity)):
         return read_walk(store, identity)
     if corridor.follow_ground and ground is None:
@@ -89,6 +95,14 @@ def create_bake(
 def read_walk(store: Store, bake: str) -> Walk:
     """The manifest of a bake; raises NotFoundError."""
     return parse(Walk, store.get(layout.walk_key(bake)), f"The manifest of bake {bake}")
+
+
+def predecessor(store: Store, bake: str) -> str | None:
+    """The bake that a bake follows, None where it stands alone."""
+    try:
+        return str(json.loads(store.get(layout.predecessor_key(bake)))["bake"])
+    except NotFoundError:
+        return None
 
 
 def settings_of(walk: Walk) -> BakeSettings:

@@ -25,6 +25,11 @@ def walk_key(bake: str) -> str:
     return f"bakes/{bake}/walk.json"
 
 
+def predecessor_key(bake: str) -> str:
+    """Which bake a bake follows, so that cells can be carried over."""
+    return f"bakes/{bake}/follows.json"
+
+
 def cells_prefix(bake: str) -> str:
     """Folder of a bake's cell files."""
     return f"bakes/{bake}/cells/"

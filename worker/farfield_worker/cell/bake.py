@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from farfield_worker.cell.impostors import ImpostorMaker, Stopwatch
 from farfield_worker.cell.layered import LayeredImpostors
 from farfield_worker.cell.slanted import SlantedImpostors
+from farfield_worker.cell.version import VERSION
 from farfield_worker.compile.encode import ENCODERS
 from farfield_worker.near import NearBlocks, near_list, near_triangles
 from farfield_worker.visibility.near_maps import NearMapRenderer
@@ -106,6 +107,7 @@ class CellBaker:
                 "near_triangles": sum(part.triangles for part in listed),
                 "near_triangles_inside": len(inside),
                 "eyes": eyes,
+                "baker": VERSION,
                 "atlas_bytes": sum(len(data) for data in files),
                 **impostors.figures,
                 **watch.figures(),

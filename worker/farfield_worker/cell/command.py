@@ -49,11 +49,15 @@ def main(argv: list[str]) -> int:
 
 def serve(store: Store, bake: str, requests: TextIO, answers: TextIO) -> None:
     """Answer requests until they end."""
-    from farfield_worker.cell.bake import CellBaker  # noqa: PLC0415 - after the environment is set
+    # after the environment is set
+    from farfield_worker.cell.bake import CellBaker  # noqa: PLC0415
+    from farfield_worker.reuse.carry import open_carrier  # noqa: PLC0415
 
     walk = read_walk(store, bake)
     grid = walk_grid(store, walk)
-    baker = CellBaker(open_prepared(store, walk.scene.id), walk, store)
+    scene = open_prepared(store, walk.scene.id)
+    carrier = open_carrier(store, walk, scene)
+    baker = CellBaker(scene, walk, store)
 
     def answer(**fields: Any) -> None:
         print(json.dumps(fields), file=answers, flush=True)
@@ -64,10 +68,13 @@ def serve(store: Store, bake: str, requests: TextIO, answers: TextIO) -> None:
             name = line.strip()
             try:
                 index = parse_cell_name(name)
-                cell = baker.bake(index, grid.centre(index))
+                centre = grid.centre(index)
+                cell = carrier.carry(index, centre) if carrier is not None else None
+                carried = cell is not None
+                cell = cell or baker.bake(index, centre)
             except FarfieldError as error:
                 answer(cell=name, ok=False, error=str(error), store=isinstance(error, StoreError))
             else:
-                answer(cell=name, ok=True, figures=cell.figures)
+                answer(cell=name, ok=True, figures={**cell.figures, "carried": carried})
     finally:
         baker.close()

@@ -15,7 +15,7 @@ from typing import Any
 
 from celery import Celery, Task, signals
 from farfield_core import scenes
-from farfield_core.dispatch.board import Board
+from farfield_core.dispatch.board import LOST, Board
 from farfield_core.dispatch.celery_prepare import PREPARING
 from farfield_core.dispatch.executor import COMMAND
 from farfield_core.dispatch.prepare import prepare_scene
@@ -51,8 +51,13 @@ def create_worker(
     command: Sequence[str] = COMMAND,
     device: Device = "cpu",
     limits: Limits | None = None,
+    lost: int = LOST,
 ) -> Celery:
-    """Make the application that `farfield worker` runs; `command` starts what bakes a cell."""
+    """Make the application that `farfield worker` runs.
+
+    `command` starts what bakes a cell; `lost` is the number of seconds without a sign of life after
+    which a process counts as lost.
+    """
     limits = limits or Limits()
     app = celery_app(broker, device, START_TIMEOUT + limits.seconds + 60)
     name = f"{socket.gethostname()}-{os.getpid()}"
@@ -65,7 +70,7 @@ def create_worker(
     def sit_down(**_: Any) -> None:
         """Make what a pool process works with, in that process."""
         end_with_parent()
-        board = Board(broker)
+        board = Board(broker, lost)
         baker = Baker(store_url, command, limits)
         slot = Slot(name, os.getpid(), socket.gethostname(), device)
         heartbeat = Heartbeat(board, slot, baker.drop, lambda: baker.megabytes)

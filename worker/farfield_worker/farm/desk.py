@@ -48,7 +48,7 @@ class Desk:
         self, bake: str, cell: str, avoid: Sequence[str], hand_over: Callable[[], None]
     ) -> None:
         """Bake a cell, or `hand_over` to another worker what this one is not to bake."""
-        if self.heartbeat.orders.aside or self.heartbeat.worker in avoid:
+        if self.heartbeat.orders.aside or self._leaves_to_others(avoid):
             time.sleep(0.5)  # or it would come straight back
             hand_over()
             return
@@ -58,6 +58,16 @@ class Desk:
         except (FarfieldError, StoreFaultError) as error:
             log.warning("the store failed, cell %s of %s has to wait: %s", cell, bake, error)
             time.sleep(_STORE_REST)
+
+    def _leaves_to_others(self, avoid: Sequence[str]) -> bool:
+        """Whether a cell is to be avoided here, and somebody lives who may bake it."""
+        if self.heartbeat.worker not in avoid:
+            return False
+        try:
+            live = {slot.worker for slot in self._board.slots()}
+            return bool(live - set(avoid) - set(self._board.aside()))
+        except (RedisError, OSError):
+            return True
 
     def _bake(self, bake: str, cell: str) -> None:
         key = layout.cell_key(bake, parse_cell_name(cell))

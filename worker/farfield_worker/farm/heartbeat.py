@@ -89,6 +89,8 @@ class Heartbeat:
                 done=self._slot.done + done,
                 tried=self._slot.tried + tried,
             )
+        if self._orders.cancelled:  # somebody waits to see it end
+            self._beat()
 
     def report(self, bake: str, report: Report) -> None:
         """Tell what became of a cell; if nobody hears, the store will tell."""
@@ -103,6 +105,8 @@ class Heartbeat:
             self._board.leave(self._slot)
 
     def _run(self) -> None:
+        # at once: whoever decides by who lives must not overlook a fresh worker
+        self._beat()
         while not self._closed.wait(BEAT):
             self._beat()
 

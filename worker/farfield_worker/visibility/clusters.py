@@ -105,9 +105,38 @@ class Clusters:
         some.runs, some._bounds = self.runs[meets], self._bounds[meets]
         return some
 
-    def draw(self, clusters: InView, eye: Floats, face: int, nearest: float, tiles: Tiles) -> None:
-        """Draw all triangles of `clusters` beyond Z = `nearest` into `tiles`."""
+    def of(self, triangles: NDArray[np.int64]) -> Clusters:
+        """Each of `triangles` (n,), the scene's indices, as a cluster of its own."""
+        order = np.argsort(self.runs[:, 1])
+        run = order[np.searchsorted(self.runs[order, 1], triangles, side="right") - 1]
+        some = copy.copy(self)
+        some.runs = np.stack([self.runs[run, 0], triangles, np.ones_like(triangles)], axis=1)
+        some._bounds = np.empty((len(triangles), 2, 3))
+        _measure(self._positions, self._indices, some.runs, some._bounds)
+        return some
+
+    def opaque(self) -> Clusters:
+        """Those without holes."""
+        solid = self._cutouts.kind[self.runs[:, 0]] == OPAQUE
+        some = copy.copy(self)
+        some.runs, some._bounds = self.runs[solid], self._bounds[solid]
+        return some
+
+    def draw(
+        self,
+        clusters: InView,
+        eye: Floats,
+        face: int,
+        nearest: float,
+        tiles: Tiles,
+        holes: bool = True,
+    ) -> None:
+        """Draw all triangles of `clusters` beyond Z = `nearest` into `tiles`.
+
+        Without `holes`, foliage and glass are drawn as if they had none.
+        """
         opaque = self._cutouts.kind[self.runs[clusters.cluster, 0]] == OPAQUE
+        opaque = opaque | (not holes)
         # what has holes comes last, when most of it is hidden
         for part, cutouts in ((opaque, None), (~opaque, self._cutouts)):
             if not part.any():

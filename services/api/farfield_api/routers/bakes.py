@@ -52,7 +52,7 @@ def describe(progress: Progress) -> BakeBody:
 def add_bake(http: Request, service: Service, request: BakeRequest) -> NewBake:
     """Ask for a bake. The same scene, corridor and settings are the same bake."""
     corridor = service.corridor(request.scene, request.corridor)
-    bake = service.create_bake(request.scene, corridor, request.settings)
+    bake = service.create_bake(request.scene, corridor, request.settings, request.follows)
     http.app.state.tracing.asked(bake)
     return NewBake(id=bake)
 

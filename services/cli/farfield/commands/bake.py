@@ -27,11 +27,22 @@ from farfield.target import prepared_scene
 @click.argument("scene")
 @corridor_option
 @click.option("--out", required=True, help="Store to bake into: a folder or s3://bucket/prefix.")
+@click.option(
+    "--follows",
+    metavar="BAKE",
+    help="A bake of the scene before an edit: cells are reused where the edit cannot be seen.",
+)
 @settings_options()
 @jobs_option
 @json_option
 def command(
-    scene: str, corridor: Path, out: str, settings: BakeSettings, jobs: int | None, as_json: bool
+    scene: str,
+    corridor: Path,
+    out: str,
+    follows: str | None,
+    settings: BakeSettings,
+    jobs: int | None,
+    as_json: bool,
 ) -> None:
     """Bake a corridor through SCENE into a store; run again to bake what is missing.
 
@@ -41,7 +52,7 @@ def command(
     settings.place()  # complain before anything is prepared
     store = Store.open(out)
     info = prepared_scene(store, scene)
-    walk = create_bake(store, info, wanted, settings)
+    walk = create_bake(store, info, wanted, settings, follows=follows)
     outcome = bake_all(store, walk, jobs)
     if as_json:
         print_json(outcome.figures)

@@ -51,16 +51,20 @@ class Orders:
 
 
 class Board:
-    """The keys above; every method raises what redis-py raises."""
+    """The keys above; every method raises what redis-py raises.
 
-    def __init__(self, broker: str) -> None:
+    Processes that give signs of life through this board count as lost after `lost` seconds.
+    """
+
+    def __init__(self, broker: str, lost: int = LOST) -> None:
+        self._lost = lost
         self._redis: Redis = Redis.from_url(
             broker, socket_timeout=10, socket_connect_timeout=5, decode_responses=True
         )
 
     def claim(self, slot: Slot) -> bool:
         """Whether no other process bakes the slot's cell."""
-        return bool(self._redis.set(_cell_key(slot), _slot_key(slot), nx=True, ex=LOST))
+        return bool(self._redis.set(_cell_key(slot), _slot_key(slot), nx=True, ex=self._lost))
 
     def release(self, slot: Slot) -> None:
         """The slot's cell is no longer under way."""
@@ -70,8 +74,8 @@ class Board:
         """Give a sign of life."""
         with self._redis.pipeline(transaction=False) as pipe:
             if slot.cell:
-                pipe.set(_cell_key(slot), _slot_key(slot), ex=LOST)
-            pipe.set(_slot_key(slot), json.dumps(asdict(slot)), ex=LOST)
+                pipe.set(_cell_key(slot), _slot_key(slot), ex=self._lost)
+            pipe.set(_slot_key(slot), json.dumps(asdict(slot)), ex=self._lost)
             pipe.exists(f"farfield:cancelled:{slot.bake}")
             pipe.hexists("farfield:aside", slot.worker)
             cancelled, aside = pipe.execute()[-2:]

@@ -389,10 +389,8 @@ class CeleryDispatcher:
         return found
 
     def _send(self, job: Job, cell: str, urgent: bool = False) -> None:
-        failed = self._blame.workers(job.bake, cell)
-        live = {slot.worker for slot in self._slots} - set(self._aside)
-        # those that failed it leave it to others, if there are any
-        avoid = sorted(failed) if live - failed else []
+        # those that failed it leave it to others, if there are any when it comes to them
+        avoid = sorted(self._blame.workers(job.bake, cell))
         try:
             self._mail.send(job.bake, cell, avoid, urgent=urgent)
         except BaseException:

@@ -24,6 +24,8 @@ class Mail:
 
     def __init__(self, broker: str, device: Device) -> None:
         self._app = celery_app(broker, device)
+        # a Redis that is there and does not answer must not hold the feeder up for ever
+        self._app.conf.broker_transport_options["socket_timeout"] = 10
         self._redis: Redis = Redis.from_url(broker, socket_timeout=10, socket_connect_timeout=5)
         self._urgent, self._others = cell_queues(device)
 
@@ -43,33 +45,37 @@ class Mail:
 
     def peek(self) -> set[tuple[str, str]]:
         """Bake and cell of all that wait."""
-        found = set()
+        found: set[tuple[str, str]] = set()
         for queue in (self._urgent, self._others):
             messages: Any = self._redis.lrange(queue, 0, -1)
-            for message in messages:
-                body = json.loads(message)["body"]
-                (bake, cell, *_), *_ = json.loads(base64.b64decode(body))
-                found.add((str(bake), str(cell)))
+            found |= {_task(message) for message in messages}
         return found
 
     def withdraw(self, bake: str, urgent: bool) -> list[str]:
         """Take a bake's cells out of a queue; returns them in their order."""
         queue = self._urgent if urgent else self._others
-        mine: list[str] = []
-        others: list[list[Any]] = []
-        with self._app.connection_for_write() as connection:
-            channel: Any = connection.default_channel
-            while (message := channel.basic_get(queue, no_ack=True)) is not None:
-                arguments, *_ = message.decode()
-                if arguments[0] == bake:
-                    mine.append(arguments[1])
-                else:
-                    others.append(arguments)
-        for arguments in others:
-            self._app.send_task(BAKE_CELL, arguments, queue=queue)
-        return mine
+        messages: Any = self._redis.lrange(queue, 0, -1)
+        # the oldest is at the end
+        mine = [
+            (message, name)
+            for message in reversed(messages)
+            for whose, name in [_task(message)]
+            if whose == bake
+        ]
+        with self._redis.pipeline(transaction=False) as pipe:
+            for message, _ in mine:
+                pipe.lrem(queue, -1, message)
+            removed = pipe.execute()
+        # what a worker has taken meanwhile is its own
+        return [name for (_, name), count in zip(mine, removed, strict=True) if count]
 
     def close(self) -> None:
         """Free the connections."""
         self._redis.close()
         self._app.close()
+
+
+def _task(message: bytes) -> tuple[str, str]:
+    """Bake and cell of a message in a queue."""
+    (bake, cell, *_), *_ = json.loads(base64.b64decode(json.loads(message)["body"]))
+    return str(bake), str(cell)
