@@ -90,13 +90,13 @@ def test_only_cells_that_can_see_the_house_are_baked_again(
     assert place
     prepare(TOWN.model, place, "town", "the town")
     before = open_prepared(store, "town")
-    first, carried = bake(store, before.info, None)
-    assert not carried
     info = edited(store, before.info)
-    _, carried = bake(store, info, first)
     after: PreparedScene = open_prepared(store, "edited")
     edit = changes(before, after)
     assert 0 < len(edit.gone) == len(edit.come) < 0.01 * before.info.triangles
+    first, carried = bake(store, before.info, None)
+    assert not carried
+    _, carried = bake(store, info, first)
     grid = walk_grid(store, create_bake(store, info, CORRIDOR, SETTINGS))
     rng = np.random.default_rng(3)
     renderers = [DepthMapRenderer(scene, 128) for scene in (before, after)]
