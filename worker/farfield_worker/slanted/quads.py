@@ -26,6 +26,8 @@ Ints = NDArray[np.int32]
 
 #: corners that the format allows a quad
 MOST_CORNERS = 8
+#: how finely corners are written, in texels (cell/slanted.py)
+ROUNDED = 1e-4
 
 
 class SlantedQuads(NamedTuple):
@@ -95,7 +97,9 @@ def face_quads(
     sheet, polygons, planes = [], [], []
     for s, plane in enumerate(sheets.plane):
         rectangle = grown_rectangle(texels.rect[s])
-        whole = clip_to_range(rectangle, plane, nearest[s], farthest[s], resolution)
+        # a corner on d = 0 must not end up behind the eye once it is rounded
+        lowest = max(nearest[s], ROUNDED * float(np.abs(plane[:2]).sum()) * 2 / resolution)
+        whole = clip_to_range(rectangle, plane, lowest, farthest[s], resolution)
         if len(whole) < 3:
             continue
         for part, part_plane in split(whole, plane, walls, resolution, cut=not dips[s]):
