@@ -17,8 +17,8 @@ from typing import Any
 
 from bench.stand import city, one_process, report
 
-CELLS = 6
-ROUNDS = 3
+CELLS = 5
+ROUNDS = 2
 
 
 class Nowhere:
