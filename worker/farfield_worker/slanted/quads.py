@@ -28,6 +28,8 @@ Ints = NDArray[np.int32]
 
 #: corners that the format allows a quad
 MOST_CORNERS = 8
+#: how finely corners are written, in texels (cell/slanted.py)
+ROUNDED = 1e-4
 
 
 class SlantedQuads(NamedTuple):
@@ -93,6 +95,10 @@ def face_quads(
     starts = texel_starts(fragments.texel, resolution)
     texels = fill(sheets, starts, disparity, low2, high2, resolution)
     farthest, nearest = disparity_range(texels, disparity, seed, triangles, tolerance, resolution)
+    # a corner on d = 0 must not end up behind the eye once it is rounded
+    farthest = np.maximum(
+        farthest, ROUNDED * np.abs(sheets.plane[:, :2]).sum(axis=1) * 2 / resolution
+    )
     dips = _dips(sheets, u, v, walls)
     sheet, polygons, planes = [], [], []
     rectangles = grown_rectangles(texels.rect)
