@@ -62,6 +62,13 @@ class GlbWriter:
         self._accessors.append(accessor)
         return len(self._accessors) - 1
 
+    def add_blob(self, data: bytes) -> int:
+        """Append a file, an image for one; returns its buffer view."""
+        view = {"buffer": 0, "byteOffset": len(self._body), "byteLength": len(data)}
+        self._views.append(view)
+        self._body += data + bytes(-len(data) % 4)
+        return len(self._views) - 1
+
     def add_range(self, array: NDArray[Any], cuts: list[tuple[int, int]]) -> list[int]:
         """Append one index buffer; returns an accessor for each (first, count) in `cuts`."""
         whole = self.add(array.reshape(-1, 1), ELEMENT_ARRAY_BUFFER)

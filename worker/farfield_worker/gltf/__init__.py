@@ -1,0 +1,1 @@
+"""A cell as one ordinary glTF file."""
