@@ -126,7 +126,10 @@ def _value(name: str, text: str) -> object:
                 f"--cell-size {text} cannot be read; give one number or three, as in 14,4,14."
             ) from None
         return numbers[0] if len(numbers) == 1 else numbers
-    return text
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def _metavar(name: str, field: FieldInfo) -> str:

@@ -61,7 +61,7 @@ class _Cost(NamedTuple):
     texels: float
     triangles: float
 
-    def of(self, layers: int, resolution: int, triangles: int) -> float:
+    def of(self, layers: float, resolution: int, triangles: int) -> float:
         """Cost under other settings."""
         return float(
             self.value
@@ -119,8 +119,7 @@ def plan(scene: SceneInfo, corridor: Corridor, settings: BakeSettings) -> Plan:
         grid = cut(corridor, settings.cell_size)
         cells = len(grid)
         centres = _some_of_grid(grid)
-    placement = settings.place()
-    layers = len(placement.layers)
+    layers = settings.layers_alike
     inside = near_triangles(scene, centres, settings.near_field * OVERLAP)
     before = {
         name: c.of(layers, settings.resolution, scene.triangles)
@@ -133,7 +132,7 @@ def plan(scene: SceneInfo, corridor: Corridor, settings: BakeSettings) -> Plan:
     return Plan(
         cells=cells,
         near_field=settings.near_field,
-        layers=layers if settings.quads == "layers" else 0,
+        layers=round(layers) if settings.quads == "layers" else 0,
         megabytes=cells * kilobytes / 1e3,
         seconds=cells * cost["seconds"],
         quads=cost["quads"],

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, BeforeValidator, Strict, ValidationError
 
 from farfield_core.errors import BadInputError
 
 M = TypeVar("M", bound=BaseModel)
+
+
+def _no_text(value: object) -> object:
+    if isinstance(value, str | bool):
+        raise ValueError("input should be a number, not text or a truth value")
+    return value
+
+
+#: numbers and truth values as JSON has them: "5" is no number, and 1 is not true
+Number = Annotated[float, BeforeValidator(_no_text)]
+Whole = Annotated[int, BeforeValidator(_no_text)]
+Flag = Annotated[bool, Strict()]
 
 
 def explain(error: ValidationError, what: str) -> str:
