@@ -9,7 +9,7 @@ from farfield_core.corridor import Corridor
 from farfield_core.scene import Bounds, MapView, Suspicion
 from farfield_core.scenes import Orientation
 from farfield_core.settings import BakeSettings
-from farfield_core.validation import Number, Whole
+from farfield_core.validation import WHOLE, Alike, Number
 from pydantic import BaseModel, ConfigDict, Field
 
 from farfield_api.keys import KeyScope
@@ -210,7 +210,7 @@ class BakeList(BaseModel):
 
 
 #: no cell's name has more digits
-CellStep = Annotated[Whole, Field(ge=-999_999_999, le=999_999_999)]
+CellStep = Annotated[int, Field(ge=-999_999_999, le=999_999_999), WHOLE]
 
 
 class Focus(BaseModel):
@@ -218,7 +218,7 @@ class Focus(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    cell: tuple[CellStep, CellStep, CellStep] = Field(examples=[[0, 0, 3]])
+    cell: Annotated[tuple[CellStep, CellStep, CellStep], Alike()] = Field(examples=[[0, 0, 3]])
 
 
 class CellNames(BaseModel):

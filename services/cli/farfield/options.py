@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import json
 from collections.abc import Callable
@@ -126,10 +127,10 @@ def _value(name: str, text: str) -> object:
                 f"--cell-size {text} cannot be read; give one number or three, as in 14,4,14."
             ) from None
         return numbers[0] if len(numbers) == 1 else numbers
-    try:
-        return float(text)
-    except ValueError:
-        return text
+    for kind in (int, float):
+        with contextlib.suppress(ValueError):
+            return kind(text)
+    return text
 
 
 def _metavar(name: str, field: FieldInfo) -> str:

@@ -25,7 +25,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from farfield_core import sweep
 from farfield_core.cells import CellGrid
 from farfield_core.errors import BadInputError
-from farfield_core.validation import Flag, Number, parse
+from farfield_core.validation import Alike, Flag, Number, parse
 
 Floats = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ Ground = Callable[[Floats, Floats, Floats], Floats]
 MAX_CELLS = 2_000_000
 
 Coordinate = Annotated[Number, Field(ge=-1e9, le=1e9)]
-Point = tuple[Coordinate, Coordinate, Coordinate]
+Point = Annotated[tuple[Coordinate, Coordinate, Coordinate], Alike()]
 Length = Annotated[Number, Field(gt=0, le=1e9)]
 
 
@@ -71,7 +71,10 @@ class Corridor(_Model):
     model_config = ConfigDict(
         json_schema_extra={
             "oneOf": [
-                {"required": [one], "properties": {one: {"type": "object"}, other: {"type": "null"}}}
+                {
+                    "required": [one],
+                    "properties": {one: {"type": "object"}, other: {"type": "null"}},
+                }
                 for one, other in (("box", "path"), ("path", "box"))
             ]
         }

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from farfield_core import placement
-from farfield_core.validation import Number, Whole
+from farfield_core.validation import WHOLE, Alike, Number
 
 # Bounds far beyond any use, within which no sum of a placement over- or underflows.
 Edge = Annotated[Number, Field(ge=1e-3, le=1e6)]
@@ -17,12 +17,12 @@ MAX_LAYERS = 4096
 
 
 def _one_number_is_a_cube(value: object) -> object:
-    return (value, value, value) if isinstance(value, int | float | str) else value
+    return (value, value, value) if isinstance(value, int | float) else value
 
 
+_Edges = Annotated[tuple[Edge, Edge, Edge], Alike()]
 Size = Annotated[
-    tuple[Edge, Edge, Edge],
-    BeforeValidator(_one_number_is_a_cube, json_schema_input_type=Edge | tuple[Edge, Edge, Edge]),
+    _Edges, BeforeValidator(_one_number_is_a_cube, json_schema_input_type=Edge | _Edges)
 ]
 
 
@@ -39,10 +39,8 @@ class BakeSettings(BaseModel):
         default=(10.0, 10.0, 10.0),
         description="edge lengths of a view cell, metres; one number means a cube",
     )
-    layers: Whole = Field(
+    layers: Annotated[int, Field(ge=1, le=MAX_LAYERS), WHOLE] = Field(
         default=64,
-        ge=1,
-        le=MAX_LAYERS,
         description="number of layers; slanted quads get the near field that so many layers have",
     )
     near: Annotated[Number, Field(gt=0, le=1e9)] | None = Field(
@@ -67,7 +65,9 @@ class BakeSettings(BaseModel):
     tolerance: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=0.68, description="share of the parallax bound that slanted quads use"
     )
-    resolution: Whole = Field(default=512, ge=16, le=4096, description="texels across a face")
+    resolution: Annotated[int, Field(ge=16, le=4096), WHOLE] = Field(
+        default=512, description="texels across a face"
+    )
     faces: Literal["auto", "sides", "all"] = Field(
         default="auto",
         description="which faces are baked; auto: those through which far geometry shows",
@@ -81,8 +81,8 @@ class BakeSettings(BaseModel):
         "more eyes",
     )
     encoder: Literal["png", "webp"] = Field(default="png", description="format of atlas pages")
-    supersample: Whole = Field(
-        default=1, ge=1, le=4, description="samples per texel and axis while rendering"
+    supersample: Annotated[int, Field(ge=1, le=4), WHOLE] = Field(
+        default=1, description="samples per texel and axis while rendering"
     )
     renderer: Literal["moderngl", "pyrender"] = Field(
         default="moderngl", description="what draws the layers"
