@@ -1,4 +1,4 @@
-"""What serving walks costs: cells straight from the API over 64 kept-alive connections.
+"""What serving walks and taking uploads costs: cells over 64 kept-alive connections, and 5 GB.
 
     python -m bench.service [--json] [--keep]
 
@@ -27,12 +27,14 @@ from farfield_core.store import Store
 
 from bench.stand import report
 from tests.integration.live import serving
+from tests.integration.test_api_uploads import upload_sparse
 from tests.integration.web import NGINX, web_server
 
 CONNECTIONS = 64
 CELLS = 60
 SECONDS = 8.0
 TURNS = 3
+UPLOAD = 5 * 10**9
 BAKE = "0123456789abcdef"
 
 
@@ -57,11 +59,15 @@ def figures() -> dict[str, Any]:
                     cpu = cpu_seconds(live.pid) - cpu
                     turns[name].append(Turn(seconds, faults, received, cpu))
             after = live.memory()
+        before_upload, peak_upload = upload_sparse(Path(folder) / "uploaded", UPLOAD)
     return {
         "connections": CONNECTIONS,
         **{name: describe(found) for name, found in turns.items()},
         "memory_before_mb": before / 1e6,
         "memory_after_mb": after / 1e6,
+        "upload_gb": UPLOAD / 1e9,
+        "upload_memory_before_mb": before_upload / 1e6,
+        "upload_memory_peak_mb": peak_upload / 1e6,
     }
 
 
