@@ -131,6 +131,9 @@ def test_corridors_are_kept_and_named(client: TestClient) -> None:
     assert answer.json()["cells"] == 3
     again = client.post(f"scenes/{scene}/corridors", json=row(3))
     assert again.json() == answer.json()
+    kept = client.get(f"scenes/{scene}/corridors/{answer.json()['id']}").json()
+    assert kept["box"] == row(3)["box"]
+    problem(client.get(f"scenes/{scene}/corridors/{16 * '0'}"), 404)
     by_name = client.post("plans", json={"scene": scene, "corridor": answer.json()["id"]})
     inline = client.post("plans", json={"scene": scene, "corridor": row(3)})
     assert by_name.json() == inline.json()

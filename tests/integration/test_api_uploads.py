@@ -239,9 +239,14 @@ def test_the_real_client_broken_off_twenty_times(tmp_path: Path) -> None:
 
 def test_memory_does_not_grow_with_the_upload(tmp_path: Path) -> None:
     """A sparse file, 5 GB in the soak: the server stays under 200 MB."""
-    size = 5 * 10**9 if SOAK else 400 * 10**6
+    before, peak = upload_sparse(tmp_path / "store", 5 * 10**9 if SOAK else 400 * 10**6)
+    assert peak < 200 * 10**6, f"{peak} bytes, {before} before"
+
+
+def upload_sparse(store: Path, size: int) -> tuple[int, int]:
+    """Send so many zeros to a server of their own: its memory before, and the most, bytes."""
     sent = 0
-    with serving(tmp_path / "store") as live, live.client(headers=TUS) as client:
+    with serving(store) as live, live.client(headers=TUS) as client:
         headers = {"Upload-Length": str(size), "Upload-Metadata": named("sparse.stl")}
         location = live.url + client.post("uploads", headers=headers).headers["location"]
         before = live.memory()
@@ -259,7 +264,5 @@ def test_memory_does_not_grow_with_the_upload(tmp_path: Path) -> None:
             )
             assert answer.status_code == 204, answer.text
             sent += length
-        upload = location.rsplit("/", 1)[-1]
-        scene_of(client, upload)
-        peak = live.memory(peak=True)
-    assert peak < 200 * 10**6, f"{peak} bytes, {before} before"
+        scene_of(client, location.rsplit("/", 1)[-1])
+        return before, live.memory(peak=True)

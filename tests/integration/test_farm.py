@@ -21,7 +21,7 @@ from redis import Redis
 
 from tests.integration.farm import Farm, children
 from tests.integration.servers import RedisServer, running
-from tests.integration.serving import API, ready_scene, row, until
+from tests.integration.serving import API, ready_scene, row, until, upload
 from tests.unit.walks import row_of_cells
 
 
@@ -272,6 +272,20 @@ def test_an_api_of_a_farm(farm: Farm, tmp_path: Path) -> None:
         until(lambda: client.get(f"bakes/{bake}").json()["state"] == "done")
         cells = client.get(f"walks/{bake}/cells").json()["cells"]
         assert sorted(cells) == ["0_0_0", "1_0_0", "2_0_0"]
+
+
+def test_a_worker_limits_what_preparing_takes(farm: Farm, tmp_path: Path) -> None:
+    app = create_app(ApiSettings(store=farm.url, broker=farm.broker, web=tmp_path))
+    farm.worker(env={"FARFIELD_PREPARE_SECONDS": "1"})
+    with TestClient(app, base_url=f"http://test{API}/") as client:
+        scene = upload(client, b"slow")
+        body = until(
+            lambda: (b := client.get(f"scenes/{scene}").json())["state"] != "preparing" and b
+        )
+        assert (body["state"], body["reason"][:36]) == (
+            "refused",
+            "Preparing the model took more than 1",
+        )
 
 
 def test_the_command_says_whether_a_worker_answers(farm: Farm) -> None:

@@ -81,6 +81,7 @@ def bake_and_look(client: TestClient) -> None:
         assert client.get(f"walks/{bake}/atlases/{page}").content.startswith(b"\x89PNG")
     until(lambda: client.get("farm").json()["workers"][0]["done"] == CELLS)  # told once a second
     (slot,) = client.get("farm").json()["workers"]
+    assert client.get("workers").json()["workers"][0]["worker"] == slot["worker"]
     assert slot["renderer"]
     assert (slot["tried"], slot["aside"]) == (0, None)
     assert client.get("farm").json()["wanted"] == {"cpu": 0, "gpu": 0}

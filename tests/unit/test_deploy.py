@@ -54,7 +54,7 @@ def test_a_wrong_compose_file_is_not_accepted(tmp_path: Path) -> None:
 
 def test_compose_builds_from_dockerfiles_that_exist() -> None:
     services = compose()["services"]
-    assert set(services) == {"redis", "s3", "api", "worker"}
+    assert set(services) == {"redis", "s3", "api", "web", "worker"}
     for name in ("s3", "api", "worker"):
         build = services[name]["build"]
         assert (ROOT / build["context"] / build["dockerfile"]).is_file()

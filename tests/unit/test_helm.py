@@ -153,6 +153,9 @@ if HELM:
         things = render(VARIANTS["elsewhere"])
         assert not named(things, "Secret")
         for _, container in containers(things):
+            if container["name"] == "web":  # it speaks to nobody but the API
+                assert "env" not in container
+                continue
             env = {entry["name"]: entry for entry in container["env"]}
             for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "FARFIELD_BROKER"):
                 assert "secretKeyRef" in env[name]["valueFrom"]

@@ -8,6 +8,7 @@ from farfield_core.errors import BadInputError
 from farfield_core.placement import (
     Placement,
     default_alpha,
+    layers_across,
     layers_for_near,
     metrics,
     place,
@@ -166,9 +167,18 @@ def test_layers_for_near_is_the_smallest(m: float, factor: float) -> None:
         assert place((m, m, m), 128, count - 1).near_field > near
 
 
+@given(st.floats(1, 10), st.floats(1.5, 100))
+def test_layers_across_is_as_many_in_closed_form(m: float, factor: float) -> None:
+    near = m * factor
+    count = layers_for_near(near, (m, m, m), 128)
+    across = layers_across(near, (m, m, m), 128)
+    assert count - 1 - 1e-6 <= across <= count + 1e-6
+
+
 @pytest.mark.parametrize(
     "call",
     [
+        lambda: layers_for_near(1.0001, (1, 1, 1), 512),
         lambda: place((1, 1, 1), 512, 0),
         lambda: place((1, 1, 0), 512, 4),
         lambda: place((1, math.nan, 1), 512, 4),

@@ -204,13 +204,13 @@ class Bakes:
 
     def done_since(self, bake: str, cursor: int) -> list[str]:
         """Cells that exist, in the order in which this server saw them, without the first."""
-        self.walk(bake)
+        self._catch_up(bake)
         with self._lock:
             return self._look(bake).done[cursor:]
 
     def done_page(self, bake: str, start: int) -> tuple[list[str], int | None]:
         """Up to `PAGE` cells that exist, and where the next page starts."""
-        self.walk(bake)
+        self._catch_up(bake)
         with self._lock:
             done = self._look(bake).done
             end = min(start + PAGE, len(done))
@@ -282,6 +282,15 @@ class Bakes:
                 seen.add(cell_name(index))
             seen.listed = time.monotonic()
         return seen
+
+    def _catch_up(self, bake: str) -> None:
+        """See to it that a bake that counts as done has all its cells here, whose news may lag."""
+        walk = self.walk(bake)
+        if self._runs_here(bake) and self._status(walk).state == "done":
+            with self._lock:
+                seen = self._look(bake)
+                if len(seen.done) < walk.grid.total:
+                    seen.listed = -1e9
 
     def _listen(self, event: Event) -> None:
         """Called by the dispatcher with everything that happens."""

@@ -29,5 +29,5 @@ async def known_scene_in_body(request: Request, service: Service) -> None:
     """Likewise where the body names the scene; what is wrong with it otherwise is told later."""
     with contextlib.suppress(ValueError, AttributeError, RecursionError):
         scene = json.loads(await request.body()).get("scene")
-        if isinstance(scene, str) and IS_ID.match(scene):
+        if isinstance(scene, str) and IS_ID.fullmatch(scene):
             await run_in_threadpool(service.scenes.describe, scene)

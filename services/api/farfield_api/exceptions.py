@@ -99,7 +99,9 @@ def problem(
 def _sentence(error: RequestValidationError) -> str:
     """Say the first fault of a request, and where it lies."""
     first = error.errors()[0]
-    place = ".".join(str(part) for part in first["loc"][1:]) or "The body"
+    # without the names of pydantic's own that tell the sides of a union apart
+    parts = [part for part in map(str, first["loc"][1:]) if "[" not in part and "-str" not in part]
+    place = ".".join(parts) or "The body"
     message = str(first["msg"]).removeprefix("Value error, ").rstrip(".")
     return f"{place}: {message[:1].lower()}{message[1:]}."
 

@@ -9,6 +9,7 @@ from farfield_core.corridor import Corridor
 from farfield_core.scene import Bounds, MapView, Suspicion
 from farfield_core.scenes import Orientation
 from farfield_core.settings import BakeSettings
+from farfield_core.validation import WHOLE, Alike, Number
 from pydantic import BaseModel, ConfigDict, Field
 
 from farfield_api.keys import KeyScope
@@ -98,7 +99,7 @@ class Rotation(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    overlap_hours: float = Field(default=24.0, ge=0, le=24 * 90, examples=[24.0])
+    overlap_hours: Number = Field(default=24.0, ge=0, le=24 * 90, examples=[24.0])
 
 
 class KeyBody(BaseModel):
@@ -210,12 +211,16 @@ class BakeList(BaseModel):
     next: str | None = None
 
 
+#: no cell's name has more digits
+CellStep = Annotated[int, Field(ge=-999_999_999, le=999_999_999), WHOLE]
+
+
 class Focus(BaseModel):
     """Where a walker stands."""
 
     model_config = ConfigDict(extra="forbid")
 
-    cell: tuple[int, int, int] = Field(examples=[[0, 0, 3]])
+    cell: Annotated[tuple[CellStep, CellStep, CellStep], Alike()] = Field(examples=[[0, 0, 3]])
 
 
 class CellNames(BaseModel):

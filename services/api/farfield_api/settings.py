@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import ipaddress
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from farfield_core.dispatch.prepare import PrepareLimits
+from farfield_core.dispatch.prepare import CPU_SECONDS, WALL_SECONDS, PrepareLimits, most_memory_mb
 from farfield_core.errors import BadInputError
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -82,8 +81,8 @@ class ApiSettings(BaseModel):
     #: memory of a process that prepares a scene, 2**20 bytes; 0: no limit, None: 3/4 of all
     prepare_memory_mb: int | None = Field(default=None, ge=0)
     #: its processor time and its time by the clock, seconds; 0: no limit
-    prepare_cpu_seconds: int = Field(default=7200, ge=0)
-    prepare_seconds: int = Field(default=3600, ge=0)
+    prepare_cpu_seconds: int = Field(default=CPU_SECONDS, ge=0)
+    prepare_seconds: int = Field(default=WALL_SECONDS, ge=0)
     #: whether keys are asked for; auto: unless the server listens on loopback
     auth: Literal["auto", "on", "off"] = "auto"
     #: keys besides those in the store: name:scope:sha256 of the key, separated by commas
@@ -114,8 +113,7 @@ class ApiSettings(BaseModel):
         """What preparing a scene may cost."""
         memory = self.prepare_memory_mb
         if memory is None:
-            pages = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-            memory = pages * 3 // 4 >> 20
+            memory = most_memory_mb()
         return PrepareLimits(memory, self.prepare_cpu_seconds, self.prepare_seconds)
 
     def link(self, path: str) -> str:

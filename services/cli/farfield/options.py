@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import json
 from collections.abc import Callable
@@ -128,17 +129,25 @@ def _value(name: str, text: str) -> object:
         return numbers[0] if len(numbers) == 1 else numbers
     if name == "budget":
         return _budget(text)
+    return _number(text)
+
+
+def _number(text: str) -> int | float | str:
+    """The number that `text` writes, else `text` itself."""
+    for kind in (int, float):
+        with contextlib.suppress(ValueError):
+            return kind(text)
     return text
 
 
-def _budget(text: str) -> dict[str, str]:
+def _budget(text: str) -> dict[str, int | float | str]:
     """`triangles=N,megabytes=M` as an object; BakeSettings judges names and numbers."""
     parts = [part.partition("=") for part in text.split(",")]
     if not all(name.strip() and sign and value.strip() for name, sign, value in parts):
         raise BadInputError(
             f"--budget {text} cannot be read; give it as in triangles=20000,megabytes=1."
         )
-    return {name.strip(): value.strip() for name, _, value in parts}
+    return {name.strip(): _number(value) for name, _, value in parts}
 
 
 def _metavar(name: str, field: FieldInfo) -> str:

@@ -25,7 +25,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from farfield_core import sweep
 from farfield_core.cells import CellGrid
 from farfield_core.errors import BadInputError
-from farfield_core.validation import parse
+from farfield_core.validation import Alike, Flag, Number, parse
 
 Floats = NDArray[np.float64]
 
@@ -34,9 +34,9 @@ Ground = Callable[[Floats, Floats, Floats], Floats]
 
 MAX_CELLS = 2_000_000
 
-Coordinate = Annotated[float, Field(allow_inf_nan=False, ge=-1e9, le=1e9)]
-Point = tuple[Coordinate, Coordinate, Coordinate]
-Length = Annotated[float, Field(allow_inf_nan=False, gt=0, le=1e9)]
+Coordinate = Annotated[Number, Field(ge=-1e9, le=1e9)]
+Point = Annotated[tuple[Coordinate, Coordinate, Coordinate], Alike()]
+Length = Annotated[Number, Field(gt=0, le=1e9)]
 
 
 class _Model(BaseModel):
@@ -68,9 +68,21 @@ class Path_(_Model):  # noqa: N801 - the word of the format, beside pathlib's
 class Corridor(_Model):
     """A corridor file."""
 
+    model_config = ConfigDict(
+        json_schema_extra={
+            "oneOf": [
+                {
+                    "required": [one],
+                    "properties": {one: {"type": "object"}, other: {"type": "null"}},
+                }
+                for one, other in (("box", "path"), ("path", "box"))
+            ]
+        }
+    )
+
     box: Box | None = None
     path: Path_ | None = None
-    follow_ground: bool = False
+    follow_ground: Flag = False
     #: height of the walker's eye above the floor, metres
     eye_height: Length = 1.7
 

@@ -143,6 +143,27 @@ def place(
     return Placement(tuple(ys), tuple(borders))
 
 
+def layers_across(
+    near: float,
+    half_extents: Sequence[float],
+    resolution: int,
+    alpha: float | None = None,
+    gap_texels: float | None = 1.0,
+) -> float:
+    """Layers between infinity and a near field of `near` metres, in closed form, at least 1.
+
+    Exact but for rounding up on a cube; on a box the number of the most demanding face.
+    """
+    alpha = default_alpha(resolution) if alpha is None else alpha
+    return max(
+        1.0,
+        *(
+            1.0 + (m.ln_g(near) - 2.0 * m.ln_k) / m.ln_layer
+            for m in metrics(half_extents, alpha, resolution, gap_texels)
+        ),
+    )
+
+
 def layers_for_near(
     near: float,
     half_extents: Sequence[float],
@@ -150,10 +171,11 @@ def layers_for_near(
     alpha: float | None = None,
     gap_texels: float | None = 1.0,
     faces: Sequence[int] = ALL,
+    most: int = 4096,
 ) -> int:
-    """Smallest number of layers whose near field is at most `near` metres.
+    """Smallest number of layers, up to `most`, whose near field is at most `near` metres.
 
-    Raises BadInputError if `near` does not lie outside the cell.
+    Raises BadInputError if `near` does not lie outside the cell, or needs more layers.
     """
     if near <= max(half_extents):
         raise BadInputError(
@@ -162,7 +184,11 @@ def layers_for_near(
         )
     low, high = 0, 1
     while place(half_extents, resolution, high, alpha, gap_texels, faces).near_field > near:
-        low, high = high, 2 * high
+        if high >= most:
+            raise BadInputError(
+                f"A near field of {near:g} m needs more than {most} layers; use a larger one."
+            )
+        low, high = high, min(2 * high, most)
     while high - low > 1:
         middle = (low + high) // 2
         if place(half_extents, resolution, middle, alpha, gap_texels, faces).near_field > near:

@@ -66,7 +66,7 @@ class _Cost(NamedTuple):
     texels: float
     triangles: float
 
-    def of(self, layers: int, resolution: int, triangles: int) -> float:
+    def of(self, layers: float, resolution: int, triangles: int) -> float:
         """Cost under other settings."""
         return float(
             self.value
@@ -121,8 +121,7 @@ def plan(
     Near triangles are those of `sampled` cells. Raises BadInputError as `create_bake` would.
     """
     cells, centres = _some_cells(corridor, settings.cell_size, sampled)
-    placement = settings.place()
-    layers = len(placement.layers)
+    layers = settings.layers_alike
     inside = near_triangles(scene, centres, settings.near_field * OVERLAP)
     before = {
         name: c.of(layers, settings.resolution, scene.triangles)
@@ -136,7 +135,7 @@ def plan(
         cells=cells,
         cell_size=settings.cell_size,
         near_field=settings.near_field,
-        layers=layers if settings.quads == "layers" else 0,
+        layers=round(layers) if settings.quads == "layers" else 0,
         megabytes=cells * kilobytes / 1e3,
         seconds=cells * cost["seconds"],
         quads=cost["quads"],

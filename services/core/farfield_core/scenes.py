@@ -16,7 +16,7 @@ from farfield_core.errors import NotFoundError
 from farfield_core.scene import PreparedScene, SceneInfo, open_scene
 from farfield_core.scene_cache import cached_scene
 from farfield_core.store import Store
-from farfield_core.validation import parse
+from farfield_core.validation import Number, parse
 
 State = Literal["uploaded", "ready", "refused"]
 
@@ -49,7 +49,7 @@ class Orientation(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     up: Literal["y", "z"] = "y"
-    scale: float = Field(default=1.0, gt=0, le=1e6, allow_inf_nan=False)
+    scale: Number = Field(default=1.0, gt=0, le=1e6)
 
     def arguments(self) -> list[str]:
         """Options of the process that prepares."""

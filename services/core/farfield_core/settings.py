@@ -7,11 +7,24 @@ import json
 from functools import lru_cache
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from farfield_core import placement
+from farfield_core.validation import WHOLE, Alike, Number
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+# Bounds far beyond any use, within which no sum of a placement over- or underflows.
+Edge = Annotated[Number, Field(ge=1e-3, le=1e6)]
+MAX_LAYERS = 4096
+
+
+def _one_number_is_a_cube(value: object) -> object:
+    return (value, value, value) if isinstance(value, int | float) else value
+
+
+_Edges = Annotated[tuple[Edge, Edge, Edge], Alike()]
+Size = Annotated[
+    _Edges, BeforeValidator(_one_number_is_a_cube, json_schema_input_type=Edge | _Edges)
+]
 
 
 class Budget(BaseModel):
@@ -19,10 +32,10 @@ class Budget(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    triangles: Annotated[int, Field(ge=1)] | None = Field(
+    triangles: Annotated[int, Field(ge=1), WHOLE] | None = Field(
         default=None, description="near triangles of a cell"
     )
-    megabytes: Positive | None = Field(
+    megabytes: Annotated[Number, Field(ge=1e-3, le=1e9)] | None = Field(
         default=None, description="atlas pages and file of a cell, 10^6 bytes"
     )
 
@@ -42,17 +55,15 @@ class BakeSettings(BaseModel):
         default="slanted",
         description="kind of impostor quads: planes of any slant, or the paper's layers",
     )
-    cell_size: tuple[Positive, Positive, Positive] = Field(
+    cell_size: Size = Field(
         default=(10.0, 10.0, 10.0),
         description="edge lengths of a view cell, metres; one number means a cube",
     )
-    layers: int = Field(
+    layers: Annotated[int, Field(ge=1, le=MAX_LAYERS), WHOLE] = Field(
         default=64,
-        ge=1,
-        le=4096,
         description="number of layers; slanted quads get the near field that so many layers have",
     )
-    near: Positive | None = Field(
+    near: Annotated[Number, Field(gt=0, le=1e9)] | None = Field(
         default=None,
         description="half width of the near field, metres; with layers it chooses their number, "
         "without it the near field is the one that `layers` layers have",
@@ -62,12 +73,12 @@ class BakeSettings(BaseModel):
         description="what a cell may come to at most, triangles=N,megabytes=M or one of them; cell "
         "size and near border are then chosen so that every cell keeps it",
     )
-    alpha: Annotated[float, Field(gt=0, lt=0.7853)] | None = Field(
+    alpha: Annotated[Number, Field(ge=1e-6, lt=0.7853)] | None = Field(
         default=None,
         description="parallax bound, radians; by default the central pixel of a 60 degree image "
         "of as many pixels as a face has texels",
     )
-    gap_texels: Positive | None = Field(
+    gap_texels: Annotated[Number, Field(ge=1e-3, le=1e6)] | None = Field(
         default=1.0,
         description="how many texels two neighbouring layers may shift by; none means no bound",
     )
@@ -76,10 +87,12 @@ class BakeSettings(BaseModel):
         description="gaps to fill: those between neighbouring layers only, as the paper does, or "
         "those where a steep surface skips layers too",
     )
-    tolerance: Annotated[float, Field(gt=0, le=1)] = Field(
+    tolerance: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=0.68, description="share of the parallax bound that slanted quads use"
     )
-    resolution: int = Field(default=512, ge=16, le=4096, description="texels across a face")
+    resolution: Annotated[int, Field(ge=16, le=4096), WHOLE] = Field(
+        default=512, description="texels across a face"
+    )
     faces: Literal["auto", "sides", "all"] = Field(
         default="auto",
         description="which faces are baked; auto: those through which far geometry shows",
@@ -93,17 +106,12 @@ class BakeSettings(BaseModel):
         "more eyes",
     )
     encoder: Literal["png", "webp"] = Field(default="png", description="format of atlas pages")
-    supersample: int = Field(
-        default=1, ge=1, le=4, description="samples per texel and axis while rendering"
+    supersample: Annotated[int, Field(ge=1, le=4), WHOLE] = Field(
+        default=1, description="samples per texel and axis while rendering"
     )
     renderer: Literal["moderngl", "pyrender"] = Field(
         default="moderngl", description="what draws the layers"
     )
-
-    @field_validator("cell_size", mode="before")
-    @classmethod
-    def _one_number_is_a_cube(cls, value: object) -> object:
-        return (value, value, value) if isinstance(value, int | float) else value
 
     @model_validator(mode="after")
     def _near_outside_cell(self) -> BakeSettings:
@@ -151,6 +159,17 @@ class BakeSettings(BaseModel):
         if self.quads == "slanted" and self.near is not None:
             return self.near
         return self.place().near_field
+
+    @property
+    def layers_alike(self) -> float:
+        """Number of layers, or for slanted quads as many as would have their near field."""
+        if self.near is None:
+            return self.layers
+        if self.quads == "layers":
+            return len(self.place().layers)
+        return placement.layers_across(
+            self.near, self.half_extents, self.resolution, self.alpha, self.gap_texels
+        )
 
     def key(self) -> str:
         """Hash of the settings that change what a bake contains."""

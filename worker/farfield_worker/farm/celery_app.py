@@ -18,7 +18,7 @@ from farfield_core import scenes
 from farfield_core.dispatch.board import LOST, Board
 from farfield_core.dispatch.celery_prepare import PREPARING
 from farfield_core.dispatch.executor import COMMAND
-from farfield_core.dispatch.prepare import prepare_scene
+from farfield_core.dispatch.prepare import PrepareLimits, prepare_scene
 from farfield_core.dispatch.queues import (
     BAKE_CELL,
     CELL_TRIED,
@@ -52,6 +52,7 @@ def create_worker(
     device: Device = "cpu",
     limits: Limits | None = None,
     lost: int = LOST,
+    prepare_limits: PrepareLimits | None = None,
 ) -> Celery:
     """Make the application that `farfield worker` runs.
 
@@ -102,7 +103,7 @@ def create_worker(
         if not desk().heartbeat.begin(PREPARING, scene):
             return
         try:
-            prepare_scene(desk().store, scene)
+            prepare_scene(desk().store, scene, limits=prepare_limits)
         except SceneRefusedError:
             return  # the store remembers why
         except Exception as error:

@@ -1,4 +1,4 @@
-"""/farm: the workers that are alive, and how many are wanted."""
+"""/farm and /workers: the workers that are alive, and how many are wanted."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pydantic import BaseModel
 
 from farfield_api.dependencies import Service
 
-router = APIRouter(prefix="/farm", tags=["farm"])
+router = APIRouter(tags=["farm"])
 
 
 class Worker(BaseModel):
@@ -42,15 +42,34 @@ class Farm(BaseModel):
     workers: list[Worker]
 
 
-@router.get("")
-def farm(service: Service) -> Farm:
+class Workers(BaseModel):
+    """Processes that bake, none for a server that bakes by itself."""
+
+    workers: list[Worker]
+
+
+@router.get("/workers")
+def workers(service: Service) -> Workers:
     """List the farm's workers."""
+    return Workers(workers=_alive(service))
+
+
+@router.get("/farm")
+def farm(service: Service) -> Farm:
+    """Get the farm's workers, and how many it could do with."""
     known = service.farm
     if known is None:
         return Farm(wanted={"cpu": 0, "gpu": 0}, left=0, workers=[])
-    aside = known.aside()
     wanted = {"cpu": 0, "gpu": 0, service.settings.device: known.wanted()}
-    workers = [
+    return Farm(wanted=wanted, left=known.left(), workers=_alive(service))
+
+
+def _alive(service: Service) -> list[Worker]:
+    known = service.farm
+    if known is None:
+        return []
+    aside = known.aside()
+    return [
         Worker(
             worker=slot.worker,
             host=slot.host,
@@ -66,4 +85,3 @@ def farm(service: Service) -> Farm:
         )
         for slot in known.slots()
     ]
-    return Farm(wanted=wanted, left=known.left(), workers=workers)

@@ -8,7 +8,7 @@ from farfield_core import layout
 from farfield_core.corridor import Corridor, cut
 from farfield_core.scenes import Orientation
 from farfield_core.settings import BakeSettings
-from fastapi import APIRouter, Body, Depends, Query, Request
+from fastapi import APIRouter, Body, Depends, Path, Query, Request
 from fastapi.responses import Response
 
 from farfield_api import immutable
@@ -127,6 +127,14 @@ def reorient(service: Service, scene: SceneId, orientation: Orientation) -> NewS
     """Read the same model with another axis up or in another unit: a scene of its own."""
     turned = service.scenes.reorient(scene, orientation)
     return NewScene(id=turned, state=service.scenes.describe(turned).state)
+
+
+@router.get("/{scene}/corridors/{corridor}", responses=problems(404, 422))
+def corridor(
+    service: Service, scene: SceneId, corridor: Annotated[str, Path(pattern=r"^[0-9a-f]{16}$")]
+) -> Corridor:
+    """Get a corridor that was kept."""
+    return service.corridor(scene, corridor)
 
 
 @router.post(

@@ -6,6 +6,7 @@ import os
 import socket
 
 import click
+from farfield_core.dispatch.prepare import PrepareLimits
 from farfield_core.dispatch.queues import Device
 from farfield_core.errors import BadInputError, FarfieldError, NotFoundError
 from farfield_worker.farm.bakers import Limits
@@ -41,7 +42,9 @@ def command(store: str, broker: str, jobs: int | None, device: Device, ping: boo
     processes = jobs or os.cpu_count() or 1
     limits = Limits.from_environment(os.environ, processes)
     _say_what_draws(device)
-    run_worker(create_worker(broker, store, device=device, limits=limits), processes, device)
+    preparing = PrepareLimits.from_environment(os.environ)
+    app = create_worker(broker, store, device=device, limits=limits, prepare_limits=preparing)
+    run_worker(app, processes, device)
 
 
 def _say_what_draws(device: Device) -> None:

@@ -15,14 +15,14 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 from farfield_core import layout, scenes
-from farfield_core.errors import FarfieldError, NotFoundError, SceneRefusedError
+from farfield_core.errors import BadInputError, FarfieldError, NotFoundError, SceneRefusedError
 from farfield_core.scene import SceneInfo
 from farfield_core.store import Store
 
@@ -30,6 +30,15 @@ from farfield_core.store import Store
 _LAST_WORDS = 1 << 16
 
 COMMAND: tuple[str, ...] = (sys.executable, "-m", "farfield_worker", "prepare")
+
+
+#: limits where nothing else is said, seconds
+CPU_SECONDS, WALL_SECONDS = 7200, 3600
+
+
+def most_memory_mb() -> int:
+    """What preparing a scene may take where nothing else is said: 3/4 of all, 2**20 bytes."""
+    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") * 3 // 4 >> 20
 
 
 @dataclass(frozen=True)
@@ -45,6 +54,25 @@ class PrepareLimits:
     memory_mb: int = 0
     cpu_seconds: int = 0
     wall_seconds: int = 0
+
+    @classmethod
+    def from_environment(cls, environ: Mapping[str, str]) -> PrepareLimits:
+        """FARFIELD_PREPARE_MEMORY_MB, by default 3/4 of the machine's, _CPU_SECONDS and _SECONDS.
+
+        Raises BadInputError.
+        """
+
+        def number(name: str, default: int) -> int:
+            text = environ.get(name, "")
+            if text and not text.isdecimal():
+                raise BadInputError(f"{name} cannot be {text!r}; give a whole number, 0 for none.")
+            return int(text) if text else default
+
+        return cls(
+            number("FARFIELD_PREPARE_MEMORY_MB", most_memory_mb()),
+            number("FARFIELD_PREPARE_CPU_SECONDS", CPU_SECONDS),
+            number("FARFIELD_PREPARE_SECONDS", WALL_SECONDS),
+        )
 
 
 def prepare_scene(

@@ -93,8 +93,14 @@ export function Drop(): JSX.Element {
           if (file !== undefined) send(file);
         }}
       />
-      <strong>Drop a model here</strong>
-      <span>or choose a file: GLB, glTF, OBJ, PLY, STL, or a zip with its textures</span>
+      <strong>
+        <span class="with-mouse">Drop a model here</span>
+        <span class="with-finger">Choose a model</span>
+      </strong>
+      <span>
+        <span class="with-mouse">or choose a file: </span>GLB, glTF, OBJ, PLY, STL, or a zip with
+        its textures
+      </span>
       {problem === '' ? null : <em role="alert">{problem}</em>}
     </label>
   );
