@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from farfield_core.cells import CellGrid
 from farfield_core.corridor import Corridor, box_shape, cut
 from farfield_core.scene import SceneInfo
 from farfield_core.settings import BakeSettings
+from farfield_core.validation import Alike
 from farfield_core.walk import OVERLAP
 
 Floats = NDArray[np.float64]
@@ -44,7 +45,7 @@ class Plan(BaseModel):
     model_config = ConfigDict(frozen=True)
 
     cells: int
-    cell_size: tuple[float, float, float]
+    cell_size: Annotated[tuple[float, float, float], Alike()]
     near_field: float
     layers: int
     megabytes: float
