@@ -51,16 +51,20 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="session")
-def pages() -> Path:
-    """The web app, built from the sources as they are."""
+def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The web app, built from the sources as they are, where no other run of tests builds it."""
+    folder = tmp_path_factory.mktemp("pages")
     subprocess.run(
-        ["npm", "run", "build", "--silent", "-w", "@farfield/app"],
+        [
+            *("npm", "run", "build", "--silent", "-w", "@farfield/app"),
+            *("--", "--outDir", str(folder), "--emptyOutDir"),
+        ],
         cwd=WEB,
         check=True,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
     )
-    return WEB / "app" / "dist"
+    return folder
 
 
 @pytest.fixture(scope="session")
