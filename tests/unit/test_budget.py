@@ -106,7 +106,6 @@ def test_the_plan_says_why() -> None:
     assert why.startswith("Cells of ")
     assert "near triangles" in why
     assert "would have" in why
-    assert within_budget(town(), STREET, settings()).plan.why == ""
 
 
 def test_a_given_near_border_is_kept() -> None:
@@ -116,7 +115,7 @@ def test_a_given_near_border_is_kept() -> None:
         within_budget(
             town(),
             STREET,
-            settings(near=1e-3, cell_size=1e-4, budget={"triangles": 1}).model_copy(
+            settings(near=1e-2, cell_size=1e-3, budget={"triangles": 1}).model_copy(
                 update={"cell_size": (90.0,) * 3}
             ),
         )
