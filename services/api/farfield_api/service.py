@@ -10,7 +10,7 @@ from pathlib import Path
 
 from farfield_core import scenes as core_scenes
 from farfield_core.bake import create_bake
-from farfield_core.budget import within_budget
+from farfield_core.choice import choose
 from farfield_core.corridor import Corridor, Ground, parse_corridor
 from farfield_core.dispatch import Dispatcher, FarmView, Listener
 from farfield_core.errors import BadInputError, NotFoundError
@@ -122,7 +122,7 @@ class FarfieldService:
         """
         info = self.ready_scene(scene)
         most = self.settings.quota_cells
-        if most and (cells := within_budget(info, corridor, settings).plan.cells) > most:
+        if most and (cells := choose(info, corridor, settings).plan.cells) > most:
             raise QuotaError(
                 f"The corridor has {cells} cells, more than the {most} that this server bakes in "
                 "one go; make it smaller, or its cells larger."

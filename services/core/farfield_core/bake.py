@@ -13,10 +13,10 @@ from collections.abc import Iterator
 
 from farfield_shading import default_light
 
-from farfield_core import layout
+from farfield_core import layout, near_border
 from farfield_core import walk as walk_format
-from farfield_core.budget import within_budget
 from farfield_core.cells import CellGrid, Index, parse_cell_name
+from farfield_core.choice import choose
 from farfield_core.corridor import Corridor, Ground, cut
 from farfield_core.errors import BadInputError, NotFoundError
 from farfield_core.ground import ground_under
@@ -50,16 +50,18 @@ def create_bake(
     """Write the manifest of a bake, or find the one written before.
 
     Corridors that follow the ground ask `ground`, which is the prepared scene's own unless given.
-    Settings with a budget stand for those that it leads to.
+    Settings with a budget, or without a near border, stand for those that they lead to.
     Cells of the bake `follows`, of the scene before an edit, are carried over where the edit does
     not show. Raises NotFoundError where there is no such bake, and BadInputError where corridor and
     settings do not go together.
     """
-    if settings.budget is not None:
-        settings = within_budget(scene, corridor, settings).settings
+    before = read_walk(store, follows) if follows is not None else None
+    if before is not None and near_border.is_open(settings):
+        # or no cell could be carried over
+        settings = settings.model_copy(update={"near": before.near_field})
+    settings = choose(scene, corridor, settings).settings
     identity = bake_id(scene.id, corridor, settings)
     if follows is not None and follows != identity:
-        read_walk(store, follows)
         store.put(layout.predecessor_key(identity), json.dumps({"bake": follows}).encode())
     if store.exists(layout.walk_key(identity)):
         return read_walk(store, identity)

@@ -11,11 +11,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 from farfield_core.corridor import Corridor, Point
 from farfield_core.errors import BadInputError
-from farfield_core.plan import Plan, plan
+from farfield_core.plan import Choice, Plan, plan
 from farfield_core.scene import SceneInfo
 from farfield_core.settings import BakeSettings, Budget
 
@@ -29,22 +28,14 @@ SAFETY = 1.25
 SAMPLED = 4096
 
 
-class Choice(NamedTuple):
-    """Settings that keep a budget, themselves without one, and what they come to."""
-
-    settings: BakeSettings
-    plan: Plan
-
-
 def within_budget(scene: SceneInfo, corridor: Corridor, settings: BakeSettings) -> Choice:
-    """The settings with cell size and near border chosen; as they are without a budget.
+    """The settings with cell size and near border chosen.
 
     `cell_size` is the largest one tried if it was given, `near` is kept if it was given.
     Raises BadInputError where no size keeps the budget.
     """
     budget = settings.budget
-    if budget is None:
-        return Choice(settings, plan(scene, corridor, settings))
+    assert budget is not None
     kilobytes = 1000 * (budget.megabytes or math.inf)
     last: Choice | None = None
     for size in _sizes(corridor, settings):

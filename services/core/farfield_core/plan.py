@@ -59,6 +59,13 @@ class Plan(BaseModel):
     why: str = ""
 
 
+class Choice(NamedTuple):
+    """Settings that leave nothing open, and what they come to."""
+
+    settings: BakeSettings
+    plan: Plan
+
+
 class _Cost(NamedTuple):
     """A cost of one cell: `value` at the reference, growing as powers of what it depends on."""
 
@@ -117,7 +124,7 @@ SAMPLED = 64
 def plan(
     scene: SceneInfo, corridor: Corridor, settings: BakeSettings, sampled: int = SAMPLED
 ) -> Plan:
-    """Plan a bake with just these settings, whatever their budget (`budget.within_budget`).
+    """Plan a bake with just these settings, whatever their budget (`choice.choose`).
 
     Near triangles are those of `sampled` cells. Raises BadInputError as `create_bake` would.
     """

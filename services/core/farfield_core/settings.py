@@ -66,7 +66,8 @@ class BakeSettings(BaseModel):
     near: Annotated[Number, Field(gt=0, le=1e9)] | None = Field(
         default=None,
         description="half width of the near field, metres; with layers it chooses their number, "
-        "without it the near field is the one that `layers` layers have",
+        "without it the near field is the one that `layers` layers have, or, for slanted quads "
+        "without layers, the one estimated to cost least",
     )
     budget: Budget | None = Field(
         default=None,

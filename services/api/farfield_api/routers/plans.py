@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from farfield_core.budget import within_budget
+from farfield_core.choice import choose
 from farfield_core.plan import Plan
 from fastapi import APIRouter, Depends
 
@@ -20,4 +20,4 @@ def make_plan(service: Service, request: BakeRequest) -> Plan:
     """Estimate cells, near field, megabytes and seconds; nothing is rendered or kept."""
     scene = service.ready_scene(request.scene)
     corridor = service.corridor(request.scene, request.corridor)
-    return within_budget(scene, corridor, request.settings).plan
+    return choose(scene, corridor, request.settings).plan

@@ -99,7 +99,8 @@ def _with_cells(settings: BakeSettings, edge: float) -> BakeSettings:
     """Settings with cubic cells of this edge, unless they say how large cells are."""
     if "cell_size" in settings.model_fields_set:
         return settings
-    return BakeSettings(**settings.model_dump(exclude={"cell_size"}), cell_size=(edge, edge, edge))
+    given = settings.model_dump(include=settings.model_fields_set)
+    return BakeSettings(**given, cell_size=(edge, edge, edge))
 
 
 def _scene(store: Store, scene: str | None, detail: int) -> str:

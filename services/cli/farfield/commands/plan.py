@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
-from farfield_core.budget import within_budget
+from farfield_core.choice import choose
 from farfield_core.corridor import read_corridor
 from farfield_core.settings import BakeSettings
 
@@ -32,7 +32,7 @@ def command(scene: str, corridor: Path, store: str, settings: BakeSettings, as_j
     """
     wanted = read_corridor(corridor)
     with borrowed_scene(store, scene) as (_, info):
-        result = within_budget(info, wanted, settings).plan
+        result = choose(info, wanted, settings).plan
     if as_json:
         print_json(result.model_dump())
         return
