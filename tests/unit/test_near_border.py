@@ -39,7 +39,7 @@ def test_no_border_between_the_extremes_is_much_cheaper(triangles: int) -> None:
     chosen = with_cheapest_border(scene, STREET, settings)
     least = cost(chosen.plan.near_triangles, chosen.plan.quads)
     usual = settings.near_field
-    for step in range(-40, 21):
+    for step in range(-40, 1):
         near = usual * 2 ** (step / 20)
         planned = plan(scene, STREET, settings.model_copy(update={"near": near}))
         # between two of the borders tried lies a factor of 1.19
@@ -49,7 +49,7 @@ def test_no_border_between_the_extremes_is_much_cheaper(triangles: int) -> None:
 def test_the_denser_the_scene_the_closer_the_border() -> None:
     near = [choose(field(n), STREET, BakeSettings()).plan.near_field for n in (1, 30, 300, 3000)]
     assert near == sorted(near, reverse=True)
-    assert near[0] > BakeSettings().near_field > 3 * near[-1]
+    assert near[0] == BakeSettings().near_field > 3 * near[-1]
 
 
 def test_what_is_given_is_kept() -> None:
@@ -80,6 +80,10 @@ def test_a_bake_that_follows_another_keeps_its_border() -> None:
 
 
 def test_the_border_stays_away_from_the_cell() -> None:
+    settings = BakeSettings(cell_size=10, resolution=64, alpha=0.2)
+    assert 6 < settings.near_field < 2 * 5.5
+    assert 5.5 < choose(field(3000), STREET, settings).plan.near_field < 5.5 * 1.2
+    # one that cannot come closer stays where it is
     settings = BakeSettings(cell_size=10, gap_texels=None, alpha=0.78)
-    assert settings.near_field < 5.2
-    assert choose(field(3000), STREET, settings).settings.near == pytest.approx(5.5, rel=0.19)
+    assert settings.near_field < 5.5
+    assert choose(field(3000), STREET, settings).settings.near == settings.near_field
