@@ -27,10 +27,12 @@ in vec4 in_position;
 in vec3 in_texel;
 out vec2 v_texel;
 flat out int v_page;
+flat out int v_one_sided;
 
 void main() {
   v_texel = in_texel.xy;
-  v_page = int(in_texel.z);
+  v_one_sided = int(in_texel.z < 0.0);
+  v_page = int(in_texel.z) ^ -v_one_sided;
   gl_Position = clip_point(in_position.xyz - in_position.w * eye, in_position.w);
 }
 """
@@ -42,8 +44,11 @@ _FRAGMENT = (
 uniform sampler2DArray pages;
 in vec2 v_texel;
 flat in int v_page;
+flat in int v_one_sided;
 
 void main() {
+  // its plane lies between this eye and the quad's own
+  if (v_one_sided != 0 && !gl_FrontFacing) discard;
   vec4 texel = texelFetch(pages, ivec3(floor(v_texel), v_page), 0);
   if (texel.a < 0.5) discard;
   color = vec4(texel.rgb, 1.0);
@@ -58,8 +63,9 @@ class QuadVertices(NamedTuple):
 
     Attributes:
         positions: (n, 4) float32, homogeneous, relative to the cell's centre.
-        texels: (n, 3) float32, column and row on the page, and the page.
-        triangles: (m, 3) uint32, in the order of the quads.
+        texels: (n, 3) float32, column and row on the page, and the page, p, or -1 - p where the
+            quad is seen from one side only.
+        triangles: (m, 3) uint32, in the order of the quads, counter-clockwise from their own eye.
     """
 
     positions: NDArray[np.float32]
@@ -101,6 +107,7 @@ def quad_vertices(
     position = direction + d[:, None] * (eyes[eye] - centre)[quad]
     turned = np.array(quads.turned, np.bool_)[quad]
     along = np.where(turned[:, None], corners[:, ::-1], corners)
+    sided = np.where(eye > 0, -1 - page, page)[quad]
     scale = np.array(quads.scales, np.float64)[quad]
     offset = np.array(quads.offsets, np.float64).reshape(-1, 2)[quad]
     texel = scale[:, None] * along + offset
@@ -109,11 +116,25 @@ def quad_vertices(
     fans = np.repeat(np.arange(len(counts)), counts - 2)
     step = np.arange(len(fans)) - np.repeat(np.cumsum(counts - 2) - (counts - 2), counts - 2)
     start = first[fans]
+    ahead, behind = start + step + 1, start + step + 2
+    # corners may go round either way; in rows that go down, a positive area is clockwise
+    clockwise = _areas(corners, first)[fans] > 0
+    second, third = np.where(clockwise, (behind, ahead), (ahead, behind))
     return QuadVertices(
         np.concatenate([position, d[:, None]], axis=1).astype(np.float32),
-        np.concatenate([texel, page[quad][:, None]], axis=1).astype(np.float32),
-        np.stack([start, start + step + 1, start + step + 2], axis=1).astype(np.uint32),
+        np.concatenate([texel, sided[:, None]], axis=1).astype(np.float32),
+        np.stack([start, second, third], axis=1).astype(np.uint32),
     )
+
+
+def _areas(corners: NDArray[np.float64], first: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Twice the signed areas of polygons, whose `corners` (n, 2) begin at `first` (q,): (q,)."""
+    if len(first) == 0:
+        return np.zeros(0)
+    after = np.arange(1, len(corners) + 1)
+    after[np.append(first[1:], len(corners)) - 1] = first
+    cross = corners[:, 0] * corners[after, 1] - corners[:, 1] * corners[after, 0]
+    return np.asarray(np.add.reduceat(cross, first))
 
 
 def _check(quads: Quads, counts: NDArray[np.int64]) -> None:

@@ -1,8 +1,9 @@
 """Draw the quads made so far into a map of disparities, to see what they leave out.
 
 Quads are drawn as readers draw them (docs/format.md): homogeneous corners, no gap between near and
-infinity, opaque where their sheet has a texel. Sheets need no atlas here: each quad's corner says
-where its sheet's texels start in one storage buffer.
+infinity, those of corner eyes seen from their eye's side only, opaque where their sheet has a
+texel. Sheets need no atlas here: each quad's corner says where its sheet's texels start in one
+storage buffer.
 """
 
 from __future__ import annotations
@@ -51,7 +52,9 @@ layout(location = 1) out uint shown;
 uniform float near;
 
 void main() {
-  ivec2 texel = clamp(ivec2(floor(v_texel)), ivec2(0), v_sheet.yz - 1);
+  // corners go round as seen from the quad's own eye, in rows that go down
+  if (v_sheet.z < 0 && !gl_FrontFacing) discard;
+  ivec2 texel = clamp(ivec2(floor(v_texel)), ivec2(0), ivec2(v_sheet.y, abs(v_sheet.z)) - 1);
   uint color = texels[v_sheet.x + texel.y * v_sheet.y + texel.x];
   if (color == 0u) discard;
   disparity = gl_FragCoord.z / near;
@@ -65,7 +68,7 @@ class QuadVertices(NamedTuple):
 
     Attributes:
         vertices: (n,) records: homogeneous point relative to the cell's centre, texel in the
-            sheet, the sheet's first texel, width and height.
+            sheet, the sheet's first texel, width and height, negative if seen from one side only.
         texels: (m,) uint32, the sheets' texels, RGBA8 packed, 0 where there is nothing.
     """
 
@@ -92,7 +95,8 @@ def quad_vertices(face: int, eye: Floats, quads: SlantedQuads, resolution: int) 
     sheet = quads.sheet[quad]
     rect = quads.texels.rect[sheet]
     record["texel"] = corners - rect[:, :2]
-    record["sheet"] = np.column_stack([starts[sheet], rect[:, 2:] - rect[:, :2]])
+    sides = (1, -1) if np.any(eye) else (1, 1)
+    record["sheet"] = np.column_stack([starts[sheet], (rect[:, 2:] - rect[:, :2]) * sides])
     # a fan of corners 0, i, i + 1 for i = 1 .. count - 2
     first = np.cumsum(counts) - counts
     triangles = counts - 2
@@ -141,6 +145,7 @@ class QuadPainter:
             self._upload(context)
             self._framebuffer.use()
             context.enable_only(moderngl.DEPTH_TEST)
+            context.front_face = "ccw"
             # this leaves integers undefined, so colours count only where there is a disparity
             self._framebuffer.clear(depth=0.0)
             axes = {"eye": eye, "right": right, "down": down, "forward": forward}

@@ -19,10 +19,14 @@ export interface QuadVertices {
   readonly positions: Float32Array<ArrayBuffer>;
   /**
    * 3 per vertex: texel column and row on the page, and the index of the page in `atlases` plus
-   * PAGES times the quad's number (for overlays; it starts again after QUADS of them).
+   * PAGES times the quad's number (for overlays; it starts again after QUADS of them), n in all,
+   * or -1 - n where the quad is seen from one side only.
    */
   readonly texels: Float32Array<ArrayBuffer>;
-  /** 3 per triangle, in the order of the file: front to back. */
+  /**
+   * 3 per triangle, in the order of the file: front to back. Counter-clockwise as seen from the
+   * quad's own eye.
+   */
   readonly indices: Uint32Array<ArrayBuffer>;
   readonly quads: number;
 }
@@ -53,6 +57,7 @@ export function buildQuadVertices(cell: CellFile, resolution: number): QuadVerti
     const scale = quads.scales[q];
     const turned = quads.turned[q] !== 0;
     const first = vertex;
+    let area = 0;
     for (let corner = 0; corner < quads.corner_counts[q]; corner++, vertex++) {
       const x = quads.corners[2 * vertex];
       const y = quads.corners[2 * vertex + 1];
@@ -65,15 +70,27 @@ export function buildQuadVertices(cell: CellFile, resolution: number): QuadVerti
       positions[4 * vertex + 3] = d;
       texels[3 * vertex] = scale * (turned ? y : x) + quads.offsets[2 * q];
       texels[3 * vertex + 1] = scale * (turned ? x : y) + quads.offsets[2 * q + 1];
-      texels[3 * vertex + 2] = quads.pages[q] + PAGES * (q % QUADS);
-      if (corner >= 2) {
-        indices[index++] = first;
-        indices[index++] = vertex - 1;
-        indices[index++] = vertex;
-      }
+      const code = quads.pages[q] + PAGES * (q % QUADS);
+      texels[3 * vertex + 2] = quads.eyes[q] === 0 ? code : -1 - code;
+      if (corner >= 2) area += doubleArea(quads.corners, first, vertex);
+    }
+    // corners may go round either way; in rows that go down, a positive area is clockwise
+    const swap = area > 0 ? 1 : 0;
+    for (let corner = first + 2; corner < vertex; corner++) {
+      indices[index++] = first;
+      indices[index++] = corner - 1 + swap;
+      indices[index++] = corner - swap;
     }
   }
   return { positions, texels, indices, quads: count };
+}
+
+/** Twice the signed area of the triangle of three corners: `first`, and the two up to `last`. */
+function doubleArea(corners: readonly number[], first: number, last: number): number {
+  const [x, y] = [corners[2 * first], corners[2 * first + 1]];
+  const [bx, by] = [corners[2 * last - 2] - x, corners[2 * last - 1] - y];
+  const [cx, cy] = [corners[2 * last] - x, corners[2 * last + 1] - y];
+  return bx * cy - cx * by;
 }
 
 /** Refuse a cell whose columns do not fit together, before anything reads past an end. */

@@ -97,6 +97,21 @@ describe('buildQuadVertices', () => {
     expect([...turned.texels]).toEqual([10, 20, 0, 10, 28, 0, 18, 28, 0]);
   });
 
+  test('corners that go round the other way face the same eye', () => {
+    const quad = { corner_counts: [4], corners: [0, 8, 8, 8, 8, 0, 0, 0] };
+    const { indices } = buildQuadVertices(cellWith(quad, [[0, 0, 0]]), 64);
+    expect([...indices]).toEqual([0, 1, 2, 0, 2, 3]);
+  });
+
+  test('quads of eyes other than the first are marked as seen from one side', () => {
+    const eyes: Vec3[] = [
+      [0, 0, 0],
+      [1, 1, 1],
+    ];
+    const { texels } = buildQuadVertices(cellWith({ eyes: [1], pages: [1] }, eyes), 64);
+    expect([...texels].filter((_, n) => n % 3 === 2)).toEqual([-2, -2, -2]);
+  });
+
   test('polygons become fans in the order of the file', () => {
     const { indices, quads, texels } = buildQuadVertices(
       cellWith(
@@ -117,7 +132,8 @@ describe('buildQuadVertices', () => {
       64,
     );
     expect(quads).toBe(2);
-    expect([...indices]).toEqual([0, 1, 2, 0, 2, 3, 4, 5, 6]);
+    // counter-clockwise on a screen whose rows go down
+    expect([...indices]).toEqual([0, 2, 1, 0, 3, 2, 4, 6, 5]);
     // The third coordinate tells the page and the quad.
     const codes = [...texels].filter((_, n) => n % 3 === 2);
     expect(codes.map((code) => code % PAGES)).toEqual([0, 0, 0, 0, 1, 1, 1]);
