@@ -1,7 +1,7 @@
 """Lists of many keys, in a folder and from a real S3 server over one.
 
-In the soak a million keys in the folder. The S3 server reads its whole folder for every thousand
-keys that it lists, so it gets a hundred thousand.
+In the soak a million keys in the folder. The S3 server keeps no index, and takes more than in
+proportion to their number, so it gets a hundred thousand.
 """
 
 import os
