@@ -122,12 +122,19 @@ export class Stage {
     this.sky?.material.dispose();
   }
 
-  /** Tell meshes of their cell's fade, near ones where the top of the picture is, for the dither pattern. */
+  /**
+   * Tell meshes of their cell's fade; far ones what the camera sees, near ones where the top of the
+   * picture is, for the dither pattern.
+   */
   private prepare(view: CellView): void {
     const { fade, top } = this.materials;
     const viewport = new Vector4();
-    const { far } = view;
-    if (far !== undefined) far.onBeforeRender = () => fadeWith(view, far, fade);
+    for (const mesh of view.farMeshes) {
+      mesh.onBeforeRender = (_renderer, _scene, camera) => {
+        fadeWith(view, mesh, fade);
+        if (mesh === view.far) view.aim(camera);
+      };
+    }
     for (const mesh of view.near) {
       mesh.onBeforeRender = (renderer) => {
         fadeWith(view, mesh, fade);
