@@ -98,9 +98,9 @@ def path_figures(quick: bool) -> dict[str, Any]:
     chart(
         "Figure 9: polygons of the walk",
         [
-            ("near and far", BLACK, [frame["near"] + 2 * frame["quads"] for frame in last]),
-            ("far (two triangles a quad)", BLUE, [2 * frame["quads"] for frame in last]),
-            ("near", RED, [frame["near"] for frame in last]),
+            ("near and far", BLACK, [frame["near"] + frame["quads"] for frame in last]),
+            ("far: quads", BLUE, [frame["quads"] for frame in last]),
+            ("near: triangles", RED, [frame["near"] for frame in last]),
         ],
         changes,
     ).save(pictures / "walk_path_9.png")
