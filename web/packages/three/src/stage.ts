@@ -15,7 +15,6 @@ import { CellLoader } from './cell-loader.js';
 import type { CellView } from './cell-view.js';
 import { fadeWith } from './fade.js';
 import { createFarMaterial } from './far-material.js';
-import { lightUniforms } from './light.js';
 import { NearMaterials } from './near-materials.js';
 import { NearTextures } from './near-textures.js';
 import { PagePool } from './page-pool.js';
@@ -34,6 +33,8 @@ export interface StageOptions {
   readonly prefetch: number;
   readonly sky: boolean;
   readonly backgroundAlpha: IUniform<number>;
+  /** Whether cells ever fade. */
+  readonly fades: boolean;
   readonly onReady: (cell: Cell, seconds: number) => void;
   readonly onError: (cell: Cell, error: Error) => void;
 }
@@ -54,7 +55,7 @@ export class Stage {
 
   constructor(options: StageOptions) {
     const { renderer, manifest, index, queue, builder, group } = options;
-    const light = lightUniforms(manifest.walk.light);
+    const { light, near_field } = manifest.walk;
     const { uploads } = this;
     const pressure = (priority: number): boolean => this.streamer.evict(priority);
     this.attributes = new AttributeUpload(uploads);
@@ -73,8 +74,8 @@ export class Stage {
       capacity: Math.max(0, options.textureBytes - this.pages.bytes),
       pressure,
     });
-    this.materials = new NearMaterials(light, manifest.walk.near_field);
-    this.farMaterial = createFarMaterial(this.pages.texture, this.materials.fade);
+    this.materials = new NearMaterials(light, near_field, options.fades);
+    this.farMaterial = createFarMaterial(this.pages.texture, this.materials.fade, options.fades);
     this.loader = new CellLoader({
       manifest,
       queue,
@@ -121,12 +122,19 @@ export class Stage {
     this.sky?.material.dispose();
   }
 
-  /** Tell meshes of their cell's fade, near ones where the top of the picture is, for the dither pattern. */
+  /**
+   * Tell meshes of their cell's fade; far ones what the camera sees, near ones where the top of the
+   * picture is, for the dither pattern.
+   */
   private prepare(view: CellView): void {
     const { fade, top } = this.materials;
     const viewport = new Vector4();
-    const { far } = view;
-    if (far !== undefined) far.onBeforeRender = () => fadeWith(view, far, fade);
+    for (const mesh of view.farMeshes) {
+      mesh.onBeforeRender = (_renderer, _scene, camera) => {
+        fadeWith(view, mesh, fade);
+        if (mesh === view.far) view.aim(camera);
+      };
+    }
     for (const mesh of view.near) {
       mesh.onBeforeRender = (renderer) => {
         fadeWith(view, mesh, fade);

@@ -292,6 +292,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
       prefetch: this.options.prefetch ?? 12,
       sky: this.options.sky ?? true,
       backgroundAlpha: this.alpha,
+      fades: (this.options.fade ?? 0) > 0,
       onReady: (cell, seconds) => {
         this.loadSeconds += (seconds - this.loadSeconds) * (this.loadSeconds === 0 ? 1 : 0.2);
         this.dispatchEvent({ type: 'cell-ready', cell, seconds });
