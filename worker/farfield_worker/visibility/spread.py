@@ -22,7 +22,7 @@ from farfield_worker.slanted.tolerance import Tolerance, highest, lowest
 Mask = NDArray[np.bool_]
 
 #: tolerances between neighbouring fragments of one surface
-STEP = 3.0
+STEP = 1.0
 
 
 def spread(
