@@ -207,12 +207,10 @@ def test_fill_is_the_ring_where_the_surface_goes_on(seen: Seen) -> None:
 
     def closed(s: int, t: int, other: int, c: int) -> bool:
         """Whether `other` closes the sliver between its texel t and texel c of s."""
-        lead = sum(
-            float(at(sheets.plane[s] - sheets.plane[other], np.array(k, np.int32))) for k in (t, c)
-        )
-        if abs(lead) < 1e-12:
-            lead = 0.0
-        mine = lead < 0 or (lead == 0 and s < other)
+        u = (t % RESOLUTION + c % RESOLUTION + 1) / RESOLUTION - 1
+        v = (t // RESOLUTION + c // RESOLUTION + 1) / RESOLUTION - 1
+        ours, its = (a * u + b * v + k for a, b, k in sheets.plane[[s, other]].tolist())
+        mine = ours < its or (ours == its and s < other)
         return not mine and (c in captured[other] or reached(other, c) == captured[s][c])
 
     for s in range(len(sheets.plane)):
@@ -258,8 +256,10 @@ def test_colours_are_those_of_the_nearest_texel_that_is_seen(seen: Seen, seed: i
         }
         for i in part:
             t, f = int(texels.texel[i]), texels.fragment[i]
-            over = at(sheets.plane[[s, sheets.owner[f]]], np.full(2, t, np.int32))
-            if known[f] and not (texels.filled[i] and over[0] < over[1]):
+            size = 2.0 / RESOLUTION
+            u, v = (t % RESOLUTION + 0.5) * size - 1, (t // RESOLUTION + 0.5) * size - 1
+            over = [a * u + b * v + c for a, b, c in sheets.plane[[s, sheets.owner[f]]].tolist()]
+            if over[0] >= over[1] if texels.filled[i] else known[f]:
                 assert got[i] == f
                 continue
             steps = {
