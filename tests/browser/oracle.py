@@ -73,8 +73,6 @@ def draw_quads(picture: Picture, cell: dict[str, Any], walk: dict[str, Any], fol
         with np.errstate(divide="ignore", invalid="ignore"):
             u, v, inverse = hit @ right / z, hit @ down / z, along / free
         x, y = (u + 1) * resolution / 2, (v + 1) * resolution / 2
-        if quads["eyes"][q] == 0:
-            z = np.where(along < 0, -z, z)  # seen from both sides
         inside = (z > 0) & (inverse >= 0) & in_polygon(corners, x, y)
         if quads["turned"][q]:
             x, y = y, x

@@ -112,8 +112,8 @@ def test_the_painter_draws_what_rays_meet(baked: tuple[PreparedScene, SlantedCel
             n = plane[0] * axes.right + plane[1] * axes.down + plane[2] * axes.forward
             denominator = 1 - n @ (eye - part.eye)
             d = rays @ n / denominator if abs(denominator) > 1e-12 else np.zeros(u.shape)
-            # quads of other eyes than the centre are seen from that eye's side of the plane only
-            ahead = (d > 0) & (denominator > 0 or not part.eye.any())
+            # quads are seen from their own eye's side of the plane only
+            ahead = (d > 0) & (denominator > 0)
             p = eye + rays / np.where(ahead, d, 1)[..., None]
             pu, pv, z = project(part.face, part.eye, p)
             xy = (np.stack([pu, pv], axis=-1) + 1) * RESOLUTION / 2

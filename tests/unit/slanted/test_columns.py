@@ -47,9 +47,13 @@ def test_columns_say_where_every_texel_lies(baked: tuple[PreparedScene, SlantedC
         ):
             q = seen[eye, part.face, plane.tobytes() + polygon.round(4).tobytes()]
             x0, y0, x1, y1 = part.quads.texels.rect[sheet]
+            picture = part.quads.images[sheet]
+            assert quads.turned[q] == (y1 - y0 > x1 - x0)
+            if quads.turned[q]:
+                x0, y0, x1, y1 = y0, x0, y1, x1
+                picture = picture.transpose(1, 0, 2)
             left, top = (offsets[q] + np.array([x0, y0])).astype(int)
             page = pages[quads.pages[q], top - 1 : top + y1 - y0 + 1, left - 1 : left + x1 - x0 + 1]
-            picture = part.quads.images[sheet]
             drawn = picture[..., 3] > 0
             assert np.array_equal(page[1:-1, 1:-1][drawn], picture[drawn])
             # the quad is a little larger than its picture: the gutter repeats its edge, alpha too

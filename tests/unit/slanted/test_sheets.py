@@ -10,6 +10,7 @@ from farfield_worker.slanted.clip import (
     grown_rectangles,
     untouched,
 )
+from farfield_worker.slanted.colours import shown
 from farfield_worker.slanted.fill import SheetTexels, fill
 from farfield_worker.slanted.fit import fit_plane
 from farfield_worker.slanted.grid import GROWTH, Grid, match, texel_starts
@@ -191,24 +192,43 @@ def test_fill_is_the_ring_where_the_surface_goes_on(seen: Seen) -> None:
     by_texel: dict[int, list[int]] = {}
     for f, t in enumerate(seen.texel):
         by_texel.setdefault(int(t), []).append(f)
-    for s, plane in enumerate(sheets.plane):
+    captured: list[dict[int, int]] = [{} for _ in sheets.plane]
+    for f in range(len(seen.texel) - 1, -1, -1):
+        captured[sheets.owner[f]][int(seen.texel[f])] = f
+
+    def reached(s: int, t: int) -> int | None:
+        """The fragment at texel t where sheet s would go on."""
+        plane = sheets.plane[s]
+        d = float(at(plane, np.array(t, np.int32)))
+        if d < (abs(plane[0]) + abs(plane[1])) * (1 + 2 * GROWTH) / RESOLUTION:
+            return None
+        fits = [f for f in by_texel.get(t, []) if low2[f] <= d <= high2[f]]
+        return min(fits, key=lambda f: abs(seen.disparity[f] - d)) if fits else None
+
+    def closed(s: int, t: int, other: int, c: int) -> bool:
+        """Whether `other` closes the sliver between its texel t and texel c of s."""
+        u = (t % RESOLUTION + c % RESOLUTION + 1) / RESOLUTION - 1
+        v = (t // RESOLUTION + c // RESOLUTION + 1) / RESOLUTION - 1
+        ours, its = (a * u + b * v + k for a, b, k in sheets.plane[[s, other]].tolist())
+        mine = ours < its or (ours == its and s < other)
+        return not mine and (c in captured[other] or reached(other, c) == captured[s][c])
+
+    for s in range(len(sheets.plane)):
         part = slice(texels.starts[s], texels.starts[s + 1])
-        captured = {
-            int(t): min(f for f in by_texel[int(t)] if sheets.owner[f] == s)
-            for t in np.unique(seen.texel[sheets.owner == s])
-        }
-        want = {t: (f, False) for t, f in captured.items()}
-        for t, here in by_texel.items():
-            x, y = t % RESOLUTION, t // RESOLUTION
-            beside = any(
-                abs(c % RESOLUTION - x) <= 1 and abs(c // RESOLUTION - y) <= 1 for c in captured
-            )
-            d = float(at(plane, np.int32(t)))
-            flat = abs(plane[0]) + abs(plane[1])
-            fits = [f for f in here if low2[f] <= d <= high2[f]]
-            if t in captured or not beside or not fits or d < flat * (1 + 2 * GROWTH) / RESOLUTION:
+        want = {t: (f, False) for t, f in captured[s].items()}
+        for t in by_texel:
+            column, row = t % RESOLUTION, t // RESOLUTION
+            beside = [
+                c
+                for c in captured[s]
+                if abs(c % RESOLUTION - column) <= 1 and abs(c // RESOLUTION - row) <= 1
+            ]
+            g = reached(s, t)
+            if t in captured[s] or not beside or g is None:
                 continue
-            want[t] = (min(fits, key=lambda f: abs(seen.disparity[f] - d)), True)
+            other = int(sheets.owner[g])
+            if not all(closed(s, t, other, c) for c in beside):
+                want[t] = (g, True)
         got = {
             int(t): (int(f), bool(r))
             for t, f, r in zip(
@@ -218,6 +238,38 @@ def test_fill_is_the_ring_where_the_surface_goes_on(seen: Seen) -> None:
         assert got == want
         x, y = np.array(sorted(want)) % RESOLUTION, np.array(sorted(want)) // RESOLUTION
         assert tuple(texels.rect[s]) == (x.min(), y.min(), x.max() + 1, y.max() + 1)
+
+
+@given(scenes, st.integers(0, 2**32 - 1))
+@settings(max_examples=30, deadline=None)
+def test_colours_are_those_of_the_nearest_texel_that_is_seen(seen: Seen, seed: int) -> None:
+    sheets, _, _ = cut(seen)
+    texels, _, _ = filled(seen, sheets)
+    known = np.random.default_rng(seed).random(len(seen.texel)) < 0.6
+    got = shown(sheets, texels, known, RESOLUTION)
+    for s in range(len(sheets.plane)):
+        part = range(texels.starts[s], texels.starts[s + 1])
+        firm = {
+            int(texels.texel[i]): texels.fragment[i]
+            for i in part
+            if not texels.filled[i] and known[texels.fragment[i]]
+        }
+        for i in part:
+            t, f = int(texels.texel[i]), texels.fragment[i]
+            size = 2.0 / RESOLUTION
+            u, v = (t % RESOLUTION + 0.5) * size - 1, (t // RESOLUTION + 0.5) * size - 1
+            over = [a * u + b * v + c for a, b, c in sheets.plane[[s, sheets.owner[f]]].tolist()]
+            if over[0] >= over[1] if texels.filled[i] else known[f]:
+                assert got[i] == f
+                continue
+            steps = {
+                c: (abs(c % RESOLUTION - t % RESOLUTION), abs(c // RESOLUTION - t // RESOLUTION))
+                for c in firm
+            }
+            near = {c: (max(step), 2 * step[0] + step[1]) for c, step in steps.items()}
+            near = {c: cost for c, cost in near.items() if cost[0] <= 2}
+            best = [firm[c] for c, cost in near.items() if cost == min(near.values())]
+            assert got[i] in (best or [f])
 
 
 @given(scenes)

@@ -71,8 +71,9 @@ def lay_out_images(
     """Places of `images`, each (h, w, 4) uint8, and the pages, (p, height, width, 4) uint8.
 
     `page_size` is (width, height). Colours go on under transparent texels and in the gutters,
-    where alpha goes on too: quads are a little larger than their pictures.
+    where alpha goes on too: quads are a little larger than their pictures. Pictures lie down.
     """
+    images = [image.transpose(1, 0, 2) if turned(image) else image for image in images]
     height = np.array([image.shape[0] for image in images], np.int32)
     width = np.array([image.shape[1] for image in images], np.int32)
     places = pack(width, height, *page_size)
@@ -80,9 +81,14 @@ def lay_out_images(
     pages = np.zeros(shape, np.uint32)
     for image, page, x, y in zip(images, *places, strict=True):
         h, w = image.shape[:2]
-        pages[page, y : y + h, x : x + w] = image.view(np.uint32)[..., 0]
+        pages[page, y : y + h, x : x + w] = np.ascontiguousarray(image).view(np.uint32)[..., 0]
     dilate(pages, places.page, places.x, places.y, width, height)
     return places, pages.view(np.uint8).reshape(*shape, 4)
+
+
+def turned(image: NDArray[np.uint8]) -> bool:
+    """Whether a picture (h, w, 4) lies on its side on its page, so that rows are long."""
+    return bool(image.shape[0] > image.shape[1])
 
 
 def quad_columns(
@@ -106,9 +112,12 @@ def quad_columns(
             nearest = float((a * u + b * v + c).max())
             x0, y0 = quads.texels.rect[sheet, :2].tolist()
             place = first + int(sheet)
+            turn = turned(quads.images[sheet])
+            if turn:
+                x0, y0 = y0, x0
             offset = (float(places.x[place] - x0), float(places.y[place] - y0))
             page = int(places.page[place])
-            rows.append((-nearest, number, part.face, polygon, (a, b, c), page, offset))
+            rows.append((-nearest, number, part.face, polygon, (a, b, c), page, offset, turn))
         first += len(quads.images)
     rows.sort(key=lambda row: row[0])
     return eyes, Quads(
@@ -121,7 +130,7 @@ def quad_columns(
         pages=tuple(row[5] for row in rows),
         scales=(1.0,) * len(rows),
         offsets=tuple(c for row in rows for c in row[6]),
-        turned=(0,) * len(rows),
+        turned=tuple(int(row[7]) for row in rows),
     )
 
 

@@ -27,12 +27,10 @@ in vec4 in_position;
 in vec3 in_texel;
 out vec2 v_texel;
 flat out int v_page;
-flat out int v_one_sided;
 
 void main() {
   v_texel = in_texel.xy;
-  v_one_sided = int(in_texel.z < 0.0);
-  v_page = int(in_texel.z) ^ -v_one_sided;
+  v_page = int(in_texel.z);
   gl_Position = clip_point(in_position.xyz - in_position.w * eye, in_position.w);
 }
 """
@@ -44,11 +42,10 @@ _FRAGMENT = (
 uniform sampler2DArray pages;
 in vec2 v_texel;
 flat in int v_page;
-flat in int v_one_sided;
 
 void main() {
   // its plane lies between this eye and the quad's own
-  if (v_one_sided != 0 && !gl_FrontFacing) discard;
+  if (!gl_FrontFacing) discard;
   vec4 texel = texelFetch(pages, ivec3(floor(v_texel), v_page), 0);
   if (texel.a < 0.5) discard;
   color = vec4(texel.rgb, 1.0);
@@ -63,8 +60,7 @@ class QuadVertices(NamedTuple):
 
     Attributes:
         positions: (n, 4) float32, homogeneous, relative to the cell's centre.
-        texels: (n, 3) float32, column and row on the page, and the page, p, or -1 - p where the
-            quad is seen from one side only.
+        texels: (n, 3) float32, column and row on the page, and the page.
         triangles: (m, 3) uint32, in the order of the quads, counter-clockwise from their own eye.
     """
 
@@ -107,7 +103,6 @@ def quad_vertices(
     position = direction + d[:, None] * (eyes[eye] - centre)[quad]
     turned = np.array(quads.turned, np.bool_)[quad]
     along = np.where(turned[:, None], corners[:, ::-1], corners)
-    sided = np.where(eye > 0, -1 - page, page)[quad]
     scale = np.array(quads.scales, np.float64)[quad]
     offset = np.array(quads.offsets, np.float64).reshape(-1, 2)[quad]
     texel = scale[:, None] * along + offset
@@ -122,7 +117,7 @@ def quad_vertices(
     second, third = np.where(clockwise, (behind, ahead), (ahead, behind))
     return QuadVertices(
         np.concatenate([position, d[:, None]], axis=1).astype(np.float32),
-        np.concatenate([texel, sided[:, None]], axis=1).astype(np.float32),
+        np.concatenate([texel, page[quad][:, None]], axis=1).astype(np.float32),
         np.stack([start, second, third], axis=1).astype(np.uint32),
     )
 

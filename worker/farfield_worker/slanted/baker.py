@@ -31,6 +31,7 @@ from farfield_worker.visibility.sampling import Watcher
 from farfield_worker.visibility.spread import spread
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 #: times the block run in its context, under a name
 Watch = Callable[[str], AbstractContextManager[None]]
@@ -62,7 +63,7 @@ class SlantedSettings:
     tolerance: float = DEFAULT_FACTOR
     faces: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
     visibility: bool = True
-    spread: int = 2
+    spread: int = 1
     residual: bool = True
     segment: SegmentSettings = field(default_factory=SegmentSettings)
 
@@ -114,15 +115,16 @@ class SlantedBaker:
                 for face in settings.faces
             }
         cell.fragments = sum(len(f.texel) for f in fragments.values())
+        known: dict[int, Mask] = {}
         if settings.visibility:
             with stage("visibility"):
-                fragments = self._visible(c, fragments, settings, look)
+                fragments, known = self._visible(c, fragments, settings, look)
         cell.seen = sum(len(f.texel) for f in fragments.values())
         self._painter.clear()
         with stage("sheets"):
             for face, here in fragments.items():
                 if len(here.texel):
-                    part = self._centre_quads(c, face, here, settings)
+                    part = self._centre_quads(c, face, here, settings, known.get(face))
                     cell.parts.append(part)
                     self._painter.add(part.face, part.eye, part.quads)
         if settings.residual:
@@ -151,8 +153,8 @@ class SlantedBaker:
         fragments: dict[int, Fragments],
         settings: SlantedSettings,
         look: Look | None,
-    ) -> dict[int, Fragments]:
-        """Fragments that some eye of the cell can see, and what continues them."""
+    ) -> tuple[dict[int, Fragments], dict[int, Mask]]:
+        """Fragments that some eye of the cell can see and what continues them; which are seen."""
         places, slack = [], []
         for face, here in fragments.items():
             places.append(texel_points(face, here.texel, here.disparity, self.resolution))
@@ -169,7 +171,7 @@ class SlantedBaker:
             look([far])
             known = far.seen
         ends = np.cumsum([len(f.texel) for f in fragments.values()])
-        visible = {}
+        visible, core = {}, {}
         for (face, here), mask in zip(fragments.items(), np.split(known, ends[:-1]), strict=True):
             wider = spread(
                 here.texel,
@@ -179,8 +181,8 @@ class SlantedBaker:
                 self.resolution,
                 settings.spread,
             )
-            visible[face] = here.take(wider)
-        return visible
+            visible[face], core[face] = here.take(wider), mask[wider]
+        return visible, core
 
     def _residuals(self, centre: Floats, settings: SlantedSettings) -> list[EyeQuads]:
         """Quads of the cell's corners; what the painter holds is what there is so far."""
@@ -201,7 +203,12 @@ class SlantedBaker:
         )
 
     def _centre_quads(
-        self, centre: Floats, face: int, fragments: Fragments, settings: SlantedSettings
+        self,
+        centre: Floats,
+        face: int,
+        fragments: Fragments,
+        settings: SlantedSettings,
+        known: Mask | None,
     ) -> EyeQuads:
         seed, planes = seeds(self.scene, centre, face, fragments.triangle)
         quads = face_quads(
@@ -212,5 +219,6 @@ class SlantedBaker:
             walls(face, np.zeros(3), settings.near),
             self.resolution,
             settings.segment,
+            seen=known,
         )
         return EyeQuads(np.zeros(3), face, quads)

@@ -4,6 +4,10 @@ Seen from off the centre, two sheets that meet at an edge part by up to twice th
 sliver of background shows between them. So every sheet goes on for one texel (8-connected), where
 the surface truly goes on: where a fragment lies within *two* tolerances of the plane. A filled
 texel may thus exceed the bound that captured texels keep; it is flagged, and its share reported.
+
+One of the two sheets is enough to close the sliver: the one that lies behind there, so that its
+ring covers nothing as long as the two have not parted. The other one's ring is left out, unless the
+sheet behind cannot reach over.
 """
 
 from __future__ import annotations
@@ -28,7 +32,7 @@ class SheetTexels(NamedTuple):
         rect: (s, 4) int32, first column and row, end column and row, of what it draws.
         starts: (s + 1,) int32.
         texel: (m,) int32, row * resolution + column.
-        fragment: (m,) int32, the fragment whose colour it shows.
+        fragment: (m,) int32, the fragment that it draws.
         filled: (m,) bool, whether it belongs to the ring.
     """
 
@@ -113,6 +117,76 @@ def _continues(
 
 
 @njit(cache=True)
+def _leads(planes: Any, s: int, other: int, x: int, y: int, resolution: int) -> bool:
+    """Whether the ring between sheets s and `other` is that of s, which lies behind.
+
+    (x, y) is the sum of the two texels' columns and rows.
+    """
+    # the centre of texel (x / 2, y / 2), by the planes' slopes in texels
+    u, v = (x + 1.0) / resolution - 1.0, (y + 1.0) / resolution - 1.0
+    ours = planes[s, 0] * u + planes[s, 1] * v + planes[s, 2]
+    its = planes[other, 0] * u + planes[other, 1] * v + planes[other, 2]
+    return bool(ours < its or (ours == its and s < other))
+
+
+@njit(cache=True)
+def _reaches(
+    owner: Any,
+    planes: Any,
+    starts: Any,
+    disparity: Any,
+    low2: Any,
+    high2: Any,
+    resolution: int,
+    sheet: int,
+    x: int,
+    y: int,
+    fragment: int,
+) -> bool:
+    """Whether `sheet` draws texel (x, y): captured there, or its ring over `fragment`."""
+    if _captured(owner, starts, y * resolution + x, sheet) >= 0:
+        return True
+    f = _continues(planes[sheet], starts, disparity, low2, high2, resolution, x, y)
+    return bool(f == fragment)
+
+
+@njit(cache=True)
+def _needed(
+    owner: Any,
+    planes: Any,
+    starts: Any,
+    disparity: Any,
+    low2: Any,
+    high2: Any,
+    resolution: int,
+    own: Any,
+    x0: int,
+    y0: int,
+    s: int,
+    f: int,
+    x: int,
+    y: int,
+) -> bool:
+    """Whether the ring of sheet s must draw fragment f at (x, y): f's own sheet does not close it.
+
+    `own` (h, w) is what s has captured from (x0, y0) on, -1 where nothing.
+    """
+    other = owner[f]
+    if other < 0:
+        return True
+    for ny in range(max(y - 1, y0), min(y + 2, y0 + own.shape[0])):
+        for nx in range(max(x - 1, x0), min(x + 2, x0 + own.shape[1])):
+            g = own[ny - y0, nx - x0]
+            if g < 0:
+                continue
+            if _leads(planes, s, other, x + nx, y + ny, resolution) or not _reaches(
+                owner, planes, starts, disparity, low2, high2, resolution, other, nx, ny, g
+            ):
+                return True
+    return False
+
+
+@njit(cache=True)
 def _fill(
     owner: Any,
     planes: Any,
@@ -149,6 +223,23 @@ def _fill(
                             ring = ring or own[ny - y0, nx - x0] >= 0
                     if ring:
                         f = _continues(planes[s], starts, disparity, low2, high2, resolution, x, y)
+                        if f >= 0 and not _needed(
+                            owner,
+                            planes,
+                            starts,
+                            disparity,
+                            low2,
+                            high2,
+                            resolution,
+                            own,
+                            x0,
+                            y0,
+                            s,
+                            f,
+                            x,
+                            y,
+                        ):
+                            f = -1
                 if f < 0:
                     continue
                 if count < len(texel):

@@ -1,7 +1,7 @@
 """Draw the quads made so far into a map of disparities, to see what they leave out.
 
 Quads are drawn as readers draw them (docs/format.md): homogeneous corners, no gap between near and
-infinity, those of corner eyes seen from their eye's side only, opaque where their sheet has a
+infinity, seen from their eye's side of the plane only, opaque where their sheet has a
 texel. Sheets need no atlas here: each quad's corner says where its sheet's texels start in one
 storage buffer.
 """
@@ -53,8 +53,8 @@ uniform float near;
 
 void main() {
   // corners go round as seen from the quad's own eye, in rows that go down
-  if (v_sheet.z < 0 && !gl_FrontFacing) discard;
-  ivec2 texel = clamp(ivec2(floor(v_texel)), ivec2(0), ivec2(v_sheet.y, abs(v_sheet.z)) - 1);
+  if (!gl_FrontFacing) discard;
+  ivec2 texel = clamp(ivec2(floor(v_texel)), ivec2(0), v_sheet.yz - 1);
   uint color = texels[v_sheet.x + texel.y * v_sheet.y + texel.x];
   if (color == 0u) discard;
   disparity = gl_FragCoord.z / near;
@@ -68,7 +68,7 @@ class QuadVertices(NamedTuple):
 
     Attributes:
         vertices: (n,) records: homogeneous point relative to the cell's centre, texel in the
-            sheet, the sheet's first texel, width and height, negative if seen from one side only.
+            sheet, the sheet's first texel, width and height.
         texels: (m,) uint32, the sheets' texels, RGBA8 packed, 0 where there is nothing.
     """
 
@@ -95,8 +95,7 @@ def quad_vertices(face: int, eye: Floats, quads: SlantedQuads, resolution: int) 
     sheet = quads.sheet[quad]
     rect = quads.texels.rect[sheet]
     record["texel"] = corners - rect[:, :2]
-    sides = (1, -1) if np.any(eye) else (1, 1)
-    record["sheet"] = np.column_stack([starts[sheet], (rect[:, 2:] - rect[:, :2]) * sides])
+    record["sheet"] = np.column_stack([starts[sheet], rect[:, 2:] - rect[:, :2]])
     # a fan of corners 0, i, i + 1 for i = 1 .. count - 2
     first = np.cumsum(counts) - counts
     triangles = counts - 2

@@ -15,6 +15,7 @@ from farfield_worker.slanted.clip import (
     grown_rectangles,
     untouched,
 )
+from farfield_worker.slanted.colours import shown
 from farfield_worker.slanted.fill import SheetTexels, fill
 from farfield_worker.slanted.fragments import Fragments
 from farfield_worker.slanted.grid import texel_starts
@@ -65,11 +66,12 @@ def face_quads(
     resolution: int,
     settings: SegmentSettings | None = None,
     least: int = 1,
+    seen: NDArray[np.bool_] | None = None,
 ) -> SlantedQuads:
     """Quads that draw `fragments`; `seed` (n,) is the row of `triangles` that each shows.
 
     `walls` (m, 3) are those of the near border (`near_border.walls`). Sheets that capture fewer
-    than `least` texels are dropped.
+    than `least` texels are dropped. Fragments not `seen` (n,) may show their neighbours' colours.
     """
     disparity = fragments.disparity.astype(np.float64)
     u, v = texel_uv(fragments.texel, resolution)
@@ -94,6 +96,8 @@ def face_quads(
     low2, high2 = tolerance.interval(disparity, 2.0)
     starts = texel_starts(fragments.texel, resolution)
     texels = fill(sheets, starts, disparity, low2, high2, resolution)
+    known = np.ones(len(disparity), np.bool_) if seen is None else seen
+    source = shown(sheets, texels, known, resolution)
     farthest, nearest = disparity_range(texels, disparity, seed, triangles, tolerance, resolution)
     # a corner on d = 0 must not end up behind the eye once it is rounded
     farthest = np.maximum(
@@ -125,7 +129,7 @@ def face_quads(
         disparity,
         sheets,
         texels,
-        sheet_images(texels, fragments.color, resolution),
+        sheet_images(texels, fragments.color[source], resolution),
     )
 
 
@@ -170,13 +174,13 @@ def _points(texel: Any, disparity: Any, axes: Any, resolution: int, points: Any)
 def sheet_images(
     texels: SheetTexels, color: NDArray[np.uint32], resolution: int
 ) -> list[NDArray[np.uint8]]:
-    """One picture per sheet of its rectangle: (h, w, 4) uint8; `color` (n,) is the fragments'."""
+    """One picture per sheet of its rectangle: (h, w, 4) uint8; `color` (m,) is its texels'."""
     images = []
     for s, (x0, y0, x1, y1) in enumerate(texels.rect):
         part = slice(texels.starts[s], texels.starts[s + 1])
         picture = np.zeros((y1 - y0, x1 - x0), np.uint32)
         texel = texels.texel[part]
-        picture[texel // resolution - y0, texel % resolution - x0] = color[texels.fragment[part]]
+        picture[texel // resolution - y0, texel % resolution - x0] = color[part]
         images.append(picture.view(np.uint8).reshape(y1 - y0, x1 - x0, 4))
     return images
 

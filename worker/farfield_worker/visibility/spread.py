@@ -3,9 +3,9 @@
 Sampling from a few eyes misses what shows only through small gaps between near things, from places
 between the samples. What shows there mostly continues a surface that some eye does see. So
 fragments count as seen if a fragment within a few texels is, and lies on the same surface: next to
-it texel by texel, within three tolerances of its disparity. Measured in a street of the medieval
-town: 2 texels bring missing pixels from 3.1e-3 of the far field to 3.6e-4, for a quarter more
-quads.
+it texel by texel, within a tolerance of its disparity. Measured on the road to the medieval town's
+gate: one texel brings missing pixels from 1.7e-3 of the far field to 8.3e-4, for 15 % more texels;
+two texels within three tolerances bring 3.9e-4, for 40 % more.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from farfield_worker.slanted.tolerance import Tolerance, highest, lowest
 Mask = NDArray[np.bool_]
 
 #: tolerances between neighbouring fragments of one surface
-STEP = 3.0
+STEP = 1.0
 
 
 def spread(

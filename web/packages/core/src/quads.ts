@@ -19,13 +19,12 @@ export interface QuadVertices {
   readonly positions: Float32Array<ArrayBuffer>;
   /**
    * 3 per vertex: texel column and row on the page, and the index of the page in `atlases` plus
-   * PAGES times the quad's number (for overlays; it starts again after QUADS of them), n in all,
-   * or -1 - n where the quad is seen from one side only.
+   * PAGES times the quad's number (for overlays; it starts again after QUADS of them).
    */
   readonly texels: Float32Array<ArrayBuffer>;
   /**
    * 3 per triangle, in the order of the file: front to back. Counter-clockwise as seen from the
-   * quad's own eye.
+   * quad's own eye, from whose side of its plane alone it is seen.
    */
   readonly indices: Uint32Array<ArrayBuffer>;
   readonly quads: number;
@@ -70,8 +69,7 @@ export function buildQuadVertices(cell: CellFile, resolution: number): QuadVerti
       positions[4 * vertex + 3] = d;
       texels[3 * vertex] = scale * (turned ? y : x) + quads.offsets[2 * q];
       texels[3 * vertex + 1] = scale * (turned ? x : y) + quads.offsets[2 * q + 1];
-      const code = quads.pages[q] + PAGES * (q % QUADS);
-      texels[3 * vertex + 2] = quads.eyes[q] === 0 ? code : -1 - code;
+      texels[3 * vertex + 2] = quads.pages[q] + PAGES * (q % QUADS);
       if (corner >= 2) area += doubleArea(quads.corners, first, vertex);
     }
     // corners may go round either way; in rows that go down, a positive area is clockwise

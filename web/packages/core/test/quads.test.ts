@@ -103,15 +103,6 @@ describe('buildQuadVertices', () => {
     expect([...indices]).toEqual([0, 1, 2, 0, 2, 3]);
   });
 
-  test('quads of eyes other than the first are marked as seen from one side', () => {
-    const eyes: Vec3[] = [
-      [0, 0, 0],
-      [1, 1, 1],
-    ];
-    const { texels } = buildQuadVertices(cellWith({ eyes: [1], pages: [1] }, eyes), 64);
-    expect([...texels].filter((_, n) => n % 3 === 2)).toEqual([-2, -2, -2]);
-  });
-
   test('polygons become fans in the order of the file', () => {
     const { indices, quads, texels } = buildQuadVertices(
       cellWith(

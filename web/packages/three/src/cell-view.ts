@@ -136,10 +136,8 @@ function part(whole: BufferGeometry, count: number): BufferGeometry {
 function farGeometry({ far, sectors }: BuiltCell, slots: readonly number[]): BufferGeometry {
   const { texels } = far;
   for (let n = 2; n < texels.length; n += 3) {
-    // one number of each kind, see QuadVertices
-    const sign = texels[n] < 0 ? -1 : 1;
-    const page = (sign < 0 ? -1 - texels[n] : texels[n]) % PAGES;
-    texels[n] += sign * (slots[page] - page);
+    const page = texels[n] % PAGES;
+    texels[n] += slots[page] - page;
   }
   const geometry = new BufferGeometry();
   geometry.setAttribute('position', new BufferAttribute(far.positions, 4));

@@ -3,7 +3,7 @@
 import {
   GLSL3,
   LessDepth,
-  DoubleSide,
+  FrontSide,
   RawShaderMaterial,
   type DataArrayTexture,
   type IUniform,
@@ -20,15 +20,13 @@ in vec4 position;
 in vec3 texel;
 out vec2 v_texel;
 flat out int v_slot;
-flat out int v_one_sided;
 #ifdef TINT
 flat out vec3 v_tint;
 #endif
 ${CLIP_GLSL}
 void main() {
   v_texel = texel.xy;
-  v_one_sided = texel.z < 0.0 ? 1 : 0;
-  int code = int(texel.z < 0.0 ? -1.0 - texel.z : texel.z);
+  int code = int(texel.z);
   v_slot = code % ${PAGES};
 #ifdef TINT
   // TINT 1: by quad. TINT 2: by layer, whose disparity all its corners have.
@@ -46,15 +44,12 @@ precision highp sampler2DArray;
 uniform sampler2DArray ff_pages;
 in vec2 v_texel;
 flat in int v_slot;
-flat in int v_one_sided;
 #ifdef TINT
 flat in vec3 v_tint;
 #endif
 out vec4 color;
 ${FADE_GLSL}
 void main() {
-  // a plane between this eye and the quad's own shows no picture of its other side
-  if (v_one_sided != 0 && !gl_FrontFacing) discard;
 #ifdef FADE
   if (ff_faded()) discard;
 #endif
@@ -80,7 +75,8 @@ export function createFarMaterial(
     fragmentShader: FRAGMENT,
     defines: fades ? { FADE: '' } : {},
     uniforms: { ff_pages: { value: pages }, ff_fade: fade },
-    side: DoubleSide,
+    // a plane between this eye and the quad's own shows no picture of its other side
+    side: FrontSide,
     depthFunc: LessDepth,
     toneMapped: false,
   });
@@ -88,5 +84,5 @@ export function createFarMaterial(
 
 /** The number of the quad that a vertex belongs to, from its third texel coordinate. */
 export function quadOf(code: number): number {
-  return Math.floor((code < 0 ? -1 - code : code) / PAGES);
+  return Math.floor(code / PAGES);
 }
