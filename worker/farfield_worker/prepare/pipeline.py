@@ -12,6 +12,7 @@ import numpy as np
 from farfield_core.scene import Batch, Block, Bounds, Part, SceneInfo, Triple, map_scene
 from numpy.typing import NDArray
 
+from farfield_worker.objects.shapes import bake_shapes
 from farfield_worker.prepare.arrays import GrowingArray
 from farfield_worker.prepare.assembly import Assembly, assemble
 from farfield_worker.prepare.batches import TextureFiles, sort_into_batches
@@ -21,6 +22,7 @@ from farfield_worker.prepare.limits import Limits, refuse
 from farfield_worker.prepare.orientation import guess_orientation, upright_matrix
 from farfield_worker.prepare.pictures import draw_pictures
 from farfield_worker.prepare.read import read_model
+from farfield_worker.prepare.repeats import Copies, find_copies
 from farfield_worker.prepare.split import split
 from farfield_worker.prepare.weld import Welded, weld
 
@@ -126,8 +128,9 @@ def _convert(
     points = centroids(assembly, origin)
     order, starts = split(points)
     progress(f"writing {len(starts) - 1} blocks")
-    blocks, vertices = _write(work, assembly, origin, batches, points, order, starts)
-    return SceneInfo(
+    copies = find_copies(model, assembly, batches)
+    blocks, vertices = _write(work, assembly, origin, batches, points, order, starts, copies)
+    info = SceneInfo(
         id=scene_id,
         name=name,
         bounds=Bounds(min=_triple(low), max=_triple(high)),
@@ -140,6 +143,10 @@ def _convert(
         notes=tuple(model.notes),
         suspected=suspected,
     )
+    if copies is not None:
+        progress(f"baking {len(copies.first)} objects that repeat")
+        bake_shapes(map_scene(work, info), copies)
+    return info
 
 
 def _write(
@@ -150,6 +157,7 @@ def _write(
     points: NDArray[np.float32],
     order: NDArray[np.uint32],
     starts: NDArray[np.int64],
+    copies: Copies | None,
 ) -> tuple[list[Block], int]:
     files = {
         "positions": GrowingArray(work / "positions.npy", np.float32, 3),
@@ -158,6 +166,8 @@ def _write(
         "colors": GrowingArray(work / "colors.npy", np.uint16, 4),
         "triangles": GrowingArray(work / "triangles.npy", np.uint32, 3),
     }
+    if copies is not None:
+        files["owners"] = GrowingArray(work / "owners.npy", np.int32, 1)
     double_sided = np.array([batch.double_sided for batch in batches], np.bool_)
     blocks: list[Block] = []
     vertices = 0
@@ -168,7 +178,11 @@ def _write(
         blocks += _describe(welded, chunk, vertices)
         welded.triangles[...] += np.uint32(vertices)
         for name, file in files.items():
-            file.append(getattr(welded, name))
+            if name == "owners":
+                assert copies is not None
+                file.append(copies.owner[welded.instance][:, None])
+            else:
+                file.append(getattr(welded, name))
         vertices += len(welded.positions)
     for file in files.values():
         file.close()

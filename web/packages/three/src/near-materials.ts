@@ -95,10 +95,12 @@ export class NearMaterials {
   readonly top: IUniform<number> = { value: 0 };
   /** Of the cell that is drawn next. */
   readonly fade: IUniform<number> = { value: 0 };
+  readonly light: Uniforms;
   private readonly shared: Uniforms;
   private readonly materials = new Map<string, RawShaderMaterial>();
 
   constructor(light: Uniforms, nearField: number) {
+    this.light = light;
     this.shared = {
       ...light,
       ff_near_field: { value: NEAR_OVERLAP * nearField },

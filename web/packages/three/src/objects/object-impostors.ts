@@ -136,6 +136,12 @@ export class ObjectImpostors {
     this.group.removeFromParent();
   }
 
+  /** Pixels per unit of slope. */
+  focal(camera: Camera): number {
+    const { height } = this.renderer.getDrawingBufferSize(new Vector2());
+    return (camera.projectionMatrix.elements[5] * height) / 2;
+  }
+
   private take(orders: readonly Order[]): void {
     const start = performance.now();
     this.taker.take(orders, rootOf(this.group));
@@ -194,7 +200,6 @@ export class ObjectImpostors {
       return [v.x, v.y, v.z];
     };
     const projection = camera.projectionMatrix.elements;
-    const { height } = this.renderer.getDrawingBufferSize(new Vector2());
     const view = new Matrix4().multiplyMatrices(
       camera.projectionMatrix,
       camera.matrixWorld.clone().invert(),
@@ -203,7 +208,7 @@ export class ObjectImpostors {
       position: new Vector3().setFromMatrixPosition(camera.matrixWorld),
       basis: { right: axis(0, 1), up: axis(1, 1), forward: axis(2, -1) },
       frustum: new Frustum().setFromProjectionMatrix(view),
-      focal: (projection[5] * height) / 2,
+      focal: this.focal(camera),
       near: projection[14] / (projection[10] - 1),
     };
   }
