@@ -91,20 +91,20 @@ def _files(store: Store, bake: str, tell: Progress) -> Iterator[tuple[str, bytes
                 known.add(name)
                 content = store.get(place)
                 yield name, content
-                waiting = _siblings(name, content)
+                waiting = siblings(name, content)
                 while waiting:
                     sibling = waiting.pop()
                     if f"near/{sibling}" not in known:
                         known.add(f"near/{sibling}")
                         beside = store.get(layout.near_key(sibling))
                         yield f"near/{sibling}", beside
-                        waiting += _siblings(sibling, beside)
+                        waiting += siblings(sibling, beside)
         yield f"cells/{key.rsplit('/', 1)[1]}", data
         tell(number + 1, len(cells))
     yield "walk.json", relocate(walk, PLACES).model_dump_json().encode()
 
 
-def _siblings(name: str, content: bytes) -> list[str]:
+def siblings(name: str, content: bytes) -> list[str]:
     """Names of the files that a near block, or an object of one, has beside it (docs/format.md)."""
     if name.endswith(".json"):
         return [str(json.loads(content)["image"])]

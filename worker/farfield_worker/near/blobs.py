@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
@@ -11,7 +10,9 @@ from typing import Any
 import numpy as np
 from farfield_core.errors import AlreadyExistsError
 from farfield_core.layout import near_key
+from farfield_core.object_file import ObjectFile
 from farfield_core.scene import Batch, PreparedScene
+from farfield_core.validation import parse
 from numpy.typing import NDArray
 
 from farfield_worker.near.glb import ARRAY_BUFFER, GlbWriter
@@ -55,7 +56,8 @@ class NearBlocks:
         if name not in self._shapes:
             folder = self._scene.folder / "objects"
             data = (folder / name).read_bytes()
-            image = json.loads(data)["image"]
+            file = parse(ObjectFile, data, f"The object {name}")
+            image = file.image
             self._store(image, (folder / image).read_bytes())
             self._store(name, data)
             self._shapes.add(name)

@@ -3,45 +3,37 @@
 from __future__ import annotations
 
 import io
-from typing import Any
 
 import numpy as np
+from farfield_core.object_file import ObjectFile
 from PIL import Image
 
 from farfield_worker.objects.error import OutlineError
 from farfield_worker.objects.fields import Fields
 from farfield_worker.objects.mesh import ObjectMesh
 
-FORMAT = "farfield-object"
-VERSION = 1
 
-
-def figures_of(mesh: ObjectMesh, fields: Fields, error: OutlineError) -> dict[str, Any]:
-    """What object.json says about its quality."""
-    return {
-        "triangles": len(mesh.corners),
-        "silhouette": error.silhouette,
-        "error": error.metres,
-        "holes": error.holes,
-        "closed": fields.closed,
-    }
-
-
-def describe(fields: Fields, name: str, figures: dict[str, Any], image: str) -> dict[str, Any]:
+def describe(
+    mesh: ObjectMesh, fields: Fields, error: OutlineError, name: str, image: str
+) -> ObjectFile:
     """object.json; `image` is its picture's name."""
     textures, resolution = fields.heights.shape[:2]
-    return {
-        "format": FORMAT,
-        "version": VERSION,
-        "name": name,
-        "low": fields.low.tolist(),
-        "high": fields.high.tolist(),
-        "axes": list(fields.axes),
-        "resolution": resolution,
-        "textures": textures,
-        "image": image,
-        **figures,
-    }
+    x, y, z = fields.low.tolist()
+    to_x, to_y, to_z = fields.high.tolist()
+    return ObjectFile(
+        name=name,
+        low=(x, y, z),
+        high=(to_x, to_y, to_z),
+        axes=fields.axes,
+        resolution=resolution,
+        textures=textures,
+        image=image,
+        triangles=len(mesh.corners),
+        silhouette=error.silhouette,
+        error=error.metres,
+        holes=error.holes,
+        closed=fields.closed,
+    )
 
 
 def picture(fields: Fields) -> bytes:

@@ -65,7 +65,7 @@ def read_mesh(
 
 
 def opaque_at(mesh: ObjectMesh, triangle: NDArray[np.int64], weights: Floats) -> NDArray[np.bool_]:
-    """Where points of triangles are no hole of an alpha mask; arguments as in `surface_at`, (n,)."""
+    """Where points of triangles are no holes of a mask, (n,); arguments as in `surface_at`."""
     masked = np.array([batch.alpha == "mask" for batch in mesh.scene.info.batches])
     rows = np.flatnonzero(masked[mesh.batch[triangle]])
     out = np.ones(len(triangle), np.bool_)

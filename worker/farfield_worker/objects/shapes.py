@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from farfield_core.scene import PreparedScene, Repeats
 
-from farfield_worker.objects.document import describe, figures_of, picture
+from farfield_worker.objects.document import describe, picture
 from farfield_worker.objects.error import OutlineError, measure
 from farfield_worker.objects.fields import Fields, bake_fields
 from farfield_worker.objects.mesh import ObjectMesh, read_mesh
@@ -44,8 +43,8 @@ def bake_shapes(scene: PreparedScene, copies: Copies) -> None:
         fields, error = baked
         number[n] = len(shapes)
         image = _put(folder, picture(fields), ".png")
-        text = describe(fields, f"object {n}", figures_of(mesh, fields, error), image)
-        shapes.append(_put(folder, json.dumps(text).encode(), ".json"))
+        text = describe(mesh, fields, error, f"object {n}", image).model_dump_json()
+        shapes.append(_put(folder, text.encode(), ".json"))
     repeats = Repeats(
         shapes=tuple(shapes),
         shape=tuple(number[copies.shape].tolist()),

@@ -99,15 +99,7 @@ def _collect(starts, height, enters, closed, half, spans, sides, low, high, surf
                 n -= 1
             n += 1
         while n > low.shape[0]:
-            best = 1
-            for k in range(2, n):
-                if spans[k, 0] - spans[k - 1, 1] < spans[best, 0] - spans[best - 1, 1]:
-                    best = k
-            filled += spans[best, 0] - spans[best - 1, 1]
-            spans[best - 1, 1], sides[best - 1, 1] = spans[best, 1], sides[best, 1]
-            for k in range(best, n - 1):
-                spans[k, 0], spans[k, 1] = spans[k + 1, 0], spans[k + 1, 1]
-                sides[k, 0], sides[k, 1] = sides[k + 1, 0], sides[k + 1, 1]
+            filled += _fill_narrowest(spans, sides, n)
             n -= 1
         for k in range(n):
             low[k, column] = max(0.0, spans[k, 0])
@@ -115,3 +107,18 @@ def _collect(starts, height, enters, closed, half, spans, sides, low, high, surf
             surface[k, 0, column], surface[k, 1, column] = sides[k, 0], sides[k, 1]
             solid += high[k, column] - low[k, column]
     return filled, solid
+
+
+@njit(cache=True)
+def _fill_narrowest(spans, sides, n):  # type: ignore[no-untyped-def]
+    """Close the narrowest gap between `n` slabs; returns how wide it was."""
+    best = 1
+    for k in range(2, n):
+        if spans[k, 0] - spans[k - 1, 1] < spans[best, 0] - spans[best - 1, 1]:
+            best = k
+    width = spans[best, 0] - spans[best - 1, 1]
+    spans[best - 1, 1], sides[best - 1, 1] = spans[best, 1], sides[best, 1]
+    for k in range(best, n - 1):
+        spans[k, 0], spans[k, 1] = spans[k + 1, 0], spans[k + 1, 1]
+        sides[k, 0], sides[k, 1] = sides[k + 1, 0], sides[k + 1, 1]
+    return width

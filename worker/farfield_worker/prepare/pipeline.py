@@ -44,12 +44,14 @@ def prepare(
     pictures: bool = True,
     up: Literal["y", "z"] = "y",
     scale: float = 1.0,
+    repeats: bool = True,
 ) -> SceneInfo:
     """Prepare the model at `source` into the folder `out`, replacing what is there.
 
     `up` is the axis of the model's own coordinates that points up, `scale` the metres in one of
     their units.
 
+    With `repeats` objects of which there are many copies are baked as true impostors.
     Nothing is visible under `out` before everything is. With `pictures` it draws the map and the
     thumbnail, which creates a GL context in this process. Raises SceneRefusedError for files that
     cannot be read, whatever is wrong with them.
@@ -60,7 +62,7 @@ def prepare(
     try:
         work.chmod(0o755)
         upright = upright_matrix(up, scale)
-        info = _prepare(source, work, scene_id, name, limits, progress, pictures, upright)
+        info = _prepare(source, work, scene_id, name, limits, progress, pictures, upright, repeats)
         if out.exists():
             shutil.rmtree(out)
         work.rename(out)
@@ -80,8 +82,9 @@ def _prepare(
     progress: Progress,
     pictures: bool,
     upright: NDArray[np.float64],
+    repeats: bool,
 ) -> SceneInfo:
-    info = _convert(source, work, scene_id, name, limits, progress, upright)
+    info = _convert(source, work, scene_id, name, limits, progress, upright, repeats)
     if pictures:
         progress("drawing the map")
         view = draw_pictures(map_scene(work, info), work)
@@ -101,6 +104,7 @@ def _convert(
     limits: Limits,
     progress: Progress,
     upright: NDArray[np.float64],
+    repeats: bool,
 ) -> SceneInfo:
     """Write everything but the pictures and scene.json."""
     progress("reading")
@@ -128,7 +132,7 @@ def _convert(
     points = centroids(assembly, origin)
     order, starts = split(points)
     progress(f"writing {len(starts) - 1} blocks")
-    copies = find_copies(model, assembly, batches)
+    copies = find_copies(model, assembly, batches) if repeats else None
     blocks, vertices = _write(work, assembly, origin, batches, points, order, starts, copies)
     info = SceneInfo(
         id=scene_id,
