@@ -48,6 +48,8 @@ CELL = 6.0
 BLOCKS, FRAMES = 8, 12
 DIRECTIONS = 100
 LOAD_FRAMES = 200
+#: frames after which `auto` has tried all ways
+TRIAL = 180
 
 
 def figures() -> dict[str, Any]:
@@ -178,6 +180,11 @@ def forest(browser: Browser, server: WalkServer) -> dict[str, Any]:
         one.call("return objects.stand.renderer.info.render.triangles") for one in (without, with_)
     ]
     close(without, with_)
+    auto = example(browser, server, f"show=walk&near=auto&walk={at}")
+    auto.call(WALK)
+    auto.call("for (let n = 0; n < args[0]; n++) objects.stand.measure(0, 1, 0)", TRIAL)
+    chosen = auto.call("return objects.hooks.walk.objects.way")
+    close(auto)
     median = {name: float(np.median(values)) for name, values in times.items()}
     return {
         "forest_ratio": median["with"] / median["without"],
@@ -186,6 +193,7 @@ def forest(browser: Browser, server: WalkServer) -> dict[str, Any]:
         "forest_ms": median,
         "forest_triangles": {"without": triangles[0], "with": triangles[1]},
         "forest_objects": stats,
+        "forest_auto": chosen,
     }
 
 

@@ -66,8 +66,8 @@ def read_mesh(
 
 def opaque_at(mesh: ObjectMesh, triangle: NDArray[np.int64], weights: Floats) -> NDArray[np.bool_]:
     """Where points of triangles are no holes of a mask, (n,); arguments as in `surface_at`."""
-    masked = np.array([batch.alpha == "mask" for batch in mesh.scene.info.batches])
-    rows = np.flatnonzero(masked[mesh.batch[triangle]])
+    masked = [n for n, batch in enumerate(mesh.scene.info.batches) if batch.alpha == "mask"]
+    rows = np.flatnonzero(np.isin(mesh.batch[triangle], masked))
     out = np.ones(len(triangle), np.bool_)
     if len(rows):
         out[rows] = surface_at(mesh, triangle[rows], weights[rows]).opaque

@@ -65,8 +65,7 @@ export class WalkObjects {
     const clock = performance.now() / 1000;
     if (this.last !== undefined) this.trial.frame(clock - this.last, clock);
     this.last = clock;
-    const { near } = this.options;
-    const way = near === 'auto' ? WAYS[this.trial.way] : near;
+    const { way } = this;
     this.showNear(way === 'always' ? this.nearObjects(view, nearField) : undefined);
     this.copies = this.showCopies(view, way === 'copies' ? this.impostors.focal(camera) : Infinity);
     this.impostors.update(camera, now);
@@ -74,6 +73,11 @@ export class WalkObjects {
 
   get stats(): ImpostorStats & { readonly copies: number } {
     return { ...this.impostors.stats, copies: this.copies };
+  }
+
+  /** How near-field objects are drawn now: what `auto` has come to. */
+  get way(): NearImpostors {
+    return this.options.near === 'auto' ? WAYS[this.trial.way] : this.options.near;
   }
 
   /** How near-field objects are drawn from the next frame on. */
