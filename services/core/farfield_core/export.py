@@ -113,4 +113,5 @@ def siblings(name: str, content: bytes) -> list[str]:
     (length,) = struct.unpack_from("<I", content, 12)
     root = json.loads(content[20 : 20 + length])
     textures = [str(image["uri"]) for image in root.get("images", []) if "uri" in image]
-    return textures + root.get("extras", {}).get("objects", {}).get("shapes", [])
+    objects = root.get("extras", {}).get("objects", {})
+    return textures + [str(shape) for shape in objects.get("shapes", [])]

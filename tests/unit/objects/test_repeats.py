@@ -32,7 +32,7 @@ COPIES = 10
 def turned(quaternion: Floats, points: Floats) -> Floats:
     """Points (n, 3) turned by a unit quaternion x, y, z, w."""
     axis, w = quaternion[:3], quaternion[3]
-    return points + 2 * np.cross(axis, np.cross(axis, points) + w * points)
+    return np.asarray(points + 2 * np.cross(axis, np.cross(axis, points) + w * points))
 
 
 @given(
@@ -107,15 +107,13 @@ def test_every_copy_is_the_object_moved_turned_and_scaled(scene: PreparedScene) 
     def middles(copy: int) -> Floats:
         return np.asarray(corners[owners == copy].mean(axis=1))
 
-    def sort(points: Floats) -> Floats:
-        return points[np.lexsort(np.round(points, 3).T)]
-
     first = middles(0) - np.array(repeats.places[0][:3])
     assert repeats.places[0][3] == pytest.approx(1)
     for copy in range(COPIES):
         *place, scale = repeats.places[copy]
         expected = turned(np.array(repeats.turns[copy]), first) * scale + place
-        from_each = trimesh.proximity.cKDTree(expected).query(middles(copy))[0]
+        some = middles(copy)[::16]
+        from_each = np.linalg.norm(some[:, None] - expected, axis=2).min(axis=1)
         assert from_each.max() < 1e-3 * scale
 
 
