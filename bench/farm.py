@@ -1,4 +1,6 @@
-"""A million cells on one machine: `python -m bench.farm [--cells N] [--queue N] --json`.
+"""A million cells on one machine.
+
+    python -m bench.farm [--cells N] [--queue N] [--json] [--keep]
 
 The feeder, the queue in a real Redis and the store's index are real, and the cells are stand-ins
 that a few lines write. `--queue` of them pass through the queue; the others are written behind the
@@ -30,11 +32,14 @@ from farfield_core.corridor import parse_corridor
 from farfield_core.dispatch.board import Board, Report
 from farfield_core.dispatch.celery import CeleryDispatcher
 from farfield_core.dispatch.queues import CELLS
+from farfield_core.memory import peak_bytes
 from farfield_core.scene import Bounds, SceneInfo
 from farfield_core.settings import BakeSettings
 from farfield_core.store import Store
 from farfield_core.tables import walk_grid
 from redis import Redis
+
+from bench.stand import report
 
 SCENE = SceneInfo(
     id="5ce0e0000000c0de",
@@ -70,7 +75,7 @@ def feed(store: str, broker: str, bake: str) -> None:
     dispatcher.close()
     usage = resource.getrusage(resource.RUSAGE_SELF)
     figures = {
-        "feeder_megabytes": usage.ru_maxrss / 1024,
+        "feeder_megabytes": peak_bytes() / 2**20,
         "feeder_cpu_seconds": usage.ru_utime + usage.ru_stime,
         "submit_seconds": submitted,
         "slowest_progress_ms": 1000 * slowest,
@@ -157,17 +162,13 @@ def main() -> None:
     parser.add_argument("--cells", type=int, default=1_000_000)
     parser.add_argument("--queue", type=int, default=20_000)
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--keep", action="store_true")
     parser.add_argument("--feed", nargs=3, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.feed:
         feed(*options.feed)
         return
-    figures = measure(options.cells, options.queue)
-    if options.json:
-        print(json.dumps(figures))
-        return
-    for name, value in figures.items():
-        print(f"{name:>24} {value:14.1f}")
+    report("farm", measure(options.cells, options.queue))
 
 
 if __name__ == "__main__":

@@ -5,8 +5,8 @@
 Figure 8 is the frame time of the walk and of the full model along the path, figure 9 the
 polygons drawn: near, far and in all; rules mark where another cell is shown. The path goes down
 the corridor, across and back, 2,197 frames as in the paper, looking ahead. Both models are
-drawn in turn from every place. The pictures and the recorded path, which the page plays with
-`?path=`, go to bench/results or to the folder FARFIELD_FIGURES.
+drawn in turn from every place. The pictures go to docs/pictures, the recorded path, which the
+page plays with `?path=`, to bench/results; or both to the folder FARFIELD_FIGURES.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from typing import Any
 
 from PIL import Image, ImageDraw
 
-from bench.browser import bake, chromium, open_walk, served
+from bench.browser import ROOT, bake, chromium, open_walk, served
 from bench.stand import RESULTS
-from bench.walk import AVENUE, CELL, QUICK, along
+from bench.walk import AVENUE, CELL, FULL, QUICK, along
 
 #: cells across and along, frames, triangles
 PAPER = (11, 27, 2197, 850_000)
@@ -35,7 +35,8 @@ BLUE, RED, GREY, BLACK = (31, 94, 168), (192, 57, 43), (205, 205, 205), (20, 20,
 def path_figures(quick: bool) -> dict[str, Any]:
     """Bake, walk the path, draw; medians and the means of what was drawn."""
     across, length, frames, triangles = SMALL if quick else PAPER
-    options = QUICK.options if quick else ("--resolution", "256", "--layers", "32")
+    sizes = QUICK if quick else FULL
+    options = (*sizes.options, *sizes.slanted)
     from farfield_worker.demo.city import write_city  # noqa: PLC0415 - slow to import
 
     started = time.perf_counter()
@@ -84,8 +85,8 @@ def path_figures(quick: bool) -> dict[str, Any]:
         "load_at_start": load,
         "seconds": time.perf_counter() - started,
     }
-    target = Path(os.environ.get("FARFIELD_FIGURES", RESULTS))
-    target.mkdir(parents=True, exist_ok=True)
+    pictures = Path(os.environ.get("FARFIELD_FIGURES", ROOT / "docs" / "pictures"))
+    pictures.mkdir(parents=True, exist_ok=True)
     chart(
         "Figure 8: frame time, ms",
         [
@@ -93,18 +94,19 @@ def path_figures(quick: bool) -> dict[str, Any]:
             ("walk", BLUE, [frame["ms"] for frame in last]),
         ],
         changes,
-    ).save(target / "walk_path_8.png")
+    ).save(pictures / "walk_path_8.png")
     chart(
         "Figure 9: polygons of the walk",
         [
-            ("near and far", BLACK, [frame["near"] + 2 * frame["quads"] for frame in last]),
-            ("far (two triangles a quad)", BLUE, [2 * frame["quads"] for frame in last]),
-            ("near", RED, [frame["near"] for frame in last]),
+            ("near and far", BLACK, [frame["near"] + frame["quads"] for frame in last]),
+            ("far: quads", BLUE, [frame["quads"] for frame in last]),
+            ("near: triangles", RED, [frame["near"] for frame in last]),
         ],
         changes,
-    ).save(target / "walk_path_9.png")
+    ).save(pictures / "walk_path_9.png")
     recorded = {"format": "farfield-path", "version": 1, "rate": 30, "poses": poses}
-    (target / "walk_path.json").write_text(json.dumps(recorded) + "\n", encoding="utf-8")
+    target = Path(os.environ.get("FARFIELD_FIGURES", RESULTS))
+    (target / "walk_path_recorded.json").write_text(json.dumps(recorded) + "\n", encoding="utf-8")
     return out
 
 

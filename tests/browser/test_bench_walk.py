@@ -53,7 +53,7 @@ def test_following_reports_every_place_once_it_can_be_seen(
     log = follow(visit.page, poses, 2000)
     assert [frame["at"] for frame in {frame["at"]: frame for frame in log}.values()] == [*range(65)]
     assert {frame["cell"] for frame in log} == {"0_0_0", "1_0_0", "2_0_0"}
-    assert all(frame["bytes"] <= frame["cap"] and frame["drawCalls"] == 1 for frame in log)
+    assert all(frame["bytes"] <= frame["cap"] and frame["drawCalls"] in (1, 2) for frame in log)
     assert sum(frame["processor"] for frame in log) > 0
     assert log[-1]["wanted"] == log[-1]["cell"] == "2_0_0"
 

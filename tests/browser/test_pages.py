@@ -75,7 +75,7 @@ def test_figures_are_those_of_the_cell(visit: Visit, server: WalkServer) -> None
     assert rows["Cell"] == "0 · 0 · 0"
     assert rows["Quads"] == str(stats["quads"])
     assert rows["Near triangles"] == str(stats["nearTriangles"]) == "84"
-    assert stats["drawCalls"]["far"] == 1
+    assert stats["drawCalls"]["far"] in (1, 2)
 
 
 def test_waiting_and_failing(browser: Browser, server: WalkServer, tmp_path: Path) -> None:

@@ -1,8 +1,9 @@
 """The main job, end to end: real models baked by the command line, served, walked in Chromium.
 
-At each cell's centre the browser's picture must equal `farfield shoot` of the walk's files, and it
-is compared with a full render of the scene. From a corner of each cell it must show no crack where
-near polygons meet the far field. Sizes are small unless FARFIELD_SOAK=1.
+At each cell's centre and corners the browser's picture must equal `farfield shoot` of the walk's
+files. At the centre it is compared with a full render of the scene, and from the corners it must
+show no crack where near polygons meet the far field. Sizes are small unless FARFIELD_SOAK=1, which
+looks from four centres and all their corners.
 """
 
 import itertools
@@ -94,11 +95,25 @@ def shot(picture: Picture) -> Shot:
     return Shot(picture.rgba[..., :3], picture.rgba[..., 3] > 0, picture.far)
 
 
-def look_at_border(
-    cell: CellFile, walk: Walk, scenes: SceneShooter, visit: Visit
-) -> NDArray[np.int64]:
-    """Pixels at a cell's near border as its corners see it in the browser, and cracks there."""
+def far_apart(seen: NDArray[np.uint8], drawn: Picture) -> dict[str, float]:
+    """How the browser's picture (h, w, 4) differs from the one that `farfield shoot` draws."""
+    wrong = max(
+        unmatched(seen[..., :3], drawn.rgba[..., :3]).mean(),
+        unmatched(drawn.rgba[..., :3], seen[..., :3]).mean(),
+    )
+    missing = eroded(drawn.rgba[..., 3] > 0) & (seen[..., 3] == 0)
+    return {"wrong": float(wrong), "missing": int(missing.sum())}
+
+
+def look_from_corners(
+    cell: CellFile, walk: Walk, walks: WalkShooter, scenes: SceneShooter, visit: Visit
+) -> tuple[NDArray[np.int64], dict[str, dict[str, float]]]:
+    """Pixels at a cell's near border as its corners see it in the browser, and cracks there.
+
+    And how the browser's pictures differ from those of `farfield shoot`, by the corner's number.
+    """
     found = np.zeros(2, np.int64)
+    apart = {}
     half = 0.95 * np.array(walk.grid.size) / 2
     for turn, corner in enumerate(CORNERS if SOAK else CORNERS[:1]):
         x, y, z = (np.array(cell.eyes[0]) + half * corner).tolist()
@@ -106,9 +121,13 @@ def look_at_border(
         visit.go_to(x, y, z, yaw, -0.1)
         view = View((x, y, z), yaw, -0.1, 60.0, SIZE, 0.01 * min(walk.grid.size))
         near_field = NearField(cell.eyes[0], walk.near_field)
-        seen = border(scenes, view, near_field, visit.pixels()[..., 3] > 0)
+        pixels = visit.pixels()
+        seen = border(scenes, view, near_field, pixels[..., 3] > 0)
         found += [int(seen.pixels.sum()), int(seen.cracks.sum())]
-    return found
+        apart[f"{cell_name(cell.cell)} corner {turn}"] = far_apart(
+            pixels, walks.shoot(view, cell.cell)
+        )
+    return found, apart
 
 
 def look_over(scene: Scene, model: Path, folder: Path, visit: Visit, web: Path) -> None:
@@ -124,7 +143,7 @@ def look_over(scene: Scene, model: Path, folder: Path, visit: Visit, web: Path) 
     prepared = open_scene(folder / "out" / prepared_prefix(walk.scene.id))
     walks, scenes = WalkShooter(bake_folder), SceneShooter(prepared)
     clip = 0.01 * min(walk.grid.size)
-    report = {}
+    report: dict[str, dict[str, Any]] = {}
     found = np.zeros(2, np.int64)
     with served(folder / "out", web) as address:
         visit.page.set_viewport_size({"width": SIZE, "height": SIZE})
@@ -139,19 +158,16 @@ def look_over(scene: Scene, model: Path, folder: Path, visit: Visit, web: Path) 
                 drawn = walks.shoot(view, cell.cell)
                 full = shot(scenes.shoot(view, NearField((x, y, z), walk.near_field)))
                 name = f"{cell_name(cell.cell)} yaw {yaw:.2f}"
-                wrong = max(
-                    unmatched(seen[..., :3], drawn.rgba[..., :3]).mean(),
-                    unmatched(drawn.rgba[..., :3], seen[..., :3]).mean(),
-                )
-                missing = eroded(drawn.rgba[..., 3] > 0) & (seen[..., 3] == 0)
                 against = compare(full, Shot(seen[..., :3], seen[..., 3] > 0, drawn.far))
                 report[name] = {
-                    "browser": {"wrong": float(wrong), "missing": int(missing.sum())},
+                    "browser": far_apart(seen, drawn),
                     "full render": None if against is None else against._asdict(),
                 }
                 sheet = np.concatenate([seen[..., :3], drawn.rgba[..., :3], full.rgb], axis=1)
                 Image.fromarray(sheet).save(folder / f"{name.replace(' ', '_')}.png")
-            found += look_at_border(cell, walk, scenes, visit)
+            pixels, apart = look_from_corners(cell, walk, walks, scenes, visit)
+            found += pixels
+            report |= {name: {"browser": f, "full render": None} for name, f in apart.items()}
     walks.close()
     scenes.close()
     if SOAK:
@@ -165,10 +181,10 @@ def look_over(scene: Scene, model: Path, folder: Path, visit: Visit, web: Path) 
         assert figures["browser"]["wrong"] <= 1e-3, (name, figures)
         assert figures["browser"]["missing"] == 0, (name, figures)
     shown = [f["full render"] for f in report.values() if f["full render"] is not None]
-    pixels = sum(f["pixels"] for f in shown)
+    total = sum(f["pixels"] for f in shown)
     # A walk of the wrong cell, or one that lacks a face, misses far more than this.
-    assert sum(f["missing"] * f["pixels"] for f in shown) <= 0.02 * pixels, report
-    assert sum(f["extra"] * f["pixels"] for f in shown) <= 0.05 * pixels, report
+    assert sum(f["missing"] * f["pixels"] for f in shown) <= 0.02 * total, report
+    assert sum(f["extra"] * f["pixels"] for f in shown) <= 0.05 * total, report
 
 
 @needs_data

@@ -37,10 +37,11 @@ SCENES = {
 DEGENERATE = {"pandora_indoor/pandora.obj": 116}
 
 PEAK = """
-import json, resource, sys
+import json, sys
+from farfield_core.memory import peak_bytes
 from farfield_worker.prepare.command import main
 code = main(sys.argv[1:])
-print(json.dumps({"kilobytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss}))
+print(json.dumps({"kilobytes": peak_bytes() // 1024}))
 sys.exit(code)
 """
 

@@ -112,16 +112,37 @@ def test_what_is_higher_than_wide_lies_down():
     assert pages[0, 1, 1:6, 0].tolist() == [1, 2, 3, 4, 5]
 
 
-def test_alike_lie_together():
-    """Rectangles of one size come in the order of their brightness, whatever their layer."""
-    levels = np.random.default_rng(1).permutation(20).astype(np.uint32)
-    texel = np.zeros(20, np.int32)
-    box = np.array([[n, 0, 0, 1, 1] for n in range(20)], np.int32)
+def places_of(colors):
+    """Columns where rectangles of one texel with these colours, (n,) uint32 RGB, are put."""
+    count = len(colors)
+    box = np.array([[n, 0, 0, 1, 1] for n in range(count)], np.int32)
     face = CompiledFace(
-        texel, levels | np.uint32(0xFF000000), np.arange(20, dtype=np.int32), box, 20, 0
+        np.zeros(count, np.int32),
+        colors | np.uint32(0xFF000000),
+        np.arange(count, dtype=np.int32),
+        box,
+        count,
+        0,
     )
     boxes, places, _ = lay_out({0: face}, 16, (64, 8))
-    np.testing.assert_array_equal(np.argsort(places.x), np.argsort(levels[boxes.layer]))
+    out = np.empty(count, np.int32)
+    out[boxes.layer] = places.x
+    return out
+
+
+def test_alike_lie_together():
+    """Greys of one size come in the order of their brightness, whatever their layer."""
+    levels = np.random.default_rng(1).permutation(20).astype(np.uint32)
+    found = places_of(levels * np.uint32(0x010101))
+    np.testing.assert_array_equal(np.argsort(found), np.argsort(levels))
+
+
+def test_colours_as_bright_lie_apart():
+    """Of three colours that are as bright, each one's rectangles lie side by side."""
+    colors = np.array([0x0000B4, 0x00B400, 0x3C3C3C], np.uint32)
+    which = np.random.default_rng(2).integers(0, 3, 18)
+    found = places_of(colors[which])
+    assert np.count_nonzero(np.diff(which[np.argsort(found)])) == 2
 
 
 def test_no_faces():

@@ -86,6 +86,15 @@ def test_examples_have_no_faults() -> None:
 
 
 @pytest.mark.parametrize("kind", MODELS)
+def test_true_is_no_version(kind: walk_format.Kind) -> None:
+    document = example(kind)
+    if "version" in document:
+        document = {**document, "version": True}
+        assert not schema_accepts(kind, document)
+        assert not model_accepts(kind, document)
+
+
+@pytest.mark.parametrize("kind", MODELS)
 @given(data=st.data())
 def test_schema_and_model_agree_on_damaged_documents(
     kind: walk_format.Kind, data: st.DataObject

@@ -17,7 +17,8 @@ const { output } = (
     build: {
       write: false,
       lib: { entry: `${root}packages/three/src/index.ts`, formats: ['es'], fileName: 'farfield' },
-      rolldownOptions: { external: ['three'] },
+      // A library's build keeps its white space; the bundler of a page that uses it does not.
+      rolldownOptions: { external: ['three'], output: { minify: true } },
     },
   })
 ).at(0);

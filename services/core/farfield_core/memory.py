@@ -1,8 +1,9 @@
-"""How much memory there is, and how much of it a process has to itself."""
+"""How much memory there is, how much a process has to itself, and how much it had at its peak."""
 
 from __future__ import annotations
 
 import os
+import resource
 from contextlib import suppress
 from pathlib import Path
 
@@ -23,9 +24,24 @@ def own_bytes(process: int) -> int:
 
     A scene that many processes map at once does not count.
     """
+    return _status_bytes(str(process), ("RssAnon:", "RssShmem:", "VmSwap:"))
+
+
+def peak_bytes() -> int:
+    """The most memory that this process has had at once, shared or not, in bytes.
+
+    `ru_maxrss` is not asked where the kernel tells better: a process that was forked and became
+    another program inherits its parent's peak there.
+    """
+    peak = _status_bytes("self", ("VmHWM:",))
+    return peak or resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def _status_bytes(process: str, fields: tuple[str, ...]) -> int:
+    """Sum of fields of a process's status; 0 where it is gone or nobody can tell."""
     total = 0
     with suppress(OSError, ValueError, IndexError):
         for line in Path(f"/proc/{process}/status").read_text(encoding="ascii").splitlines():
-            if line.startswith(("RssAnon:", "RssShmem:", "VmSwap:")):
+            if line.startswith(fields):
                 total += int(line.split()[1]) * 1024
     return total

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, model_validator
 
 from farfield_core.scene import Bounds, Triple
+from farfield_core.validation import WHOLE
 
 VERSION: Literal[1] = 1
 
@@ -109,7 +110,7 @@ class Walk(StrictModel):
     """walk.json."""
 
     format: Literal["farfield-walk"] = "farfield-walk"
-    version: Literal[1] = VERSION
+    version: Annotated[Literal[1], WHOLE] = VERSION
     id: Text
     name: str
     scene: WalkScene
@@ -165,7 +166,7 @@ class CellFile(StrictModel):
     """cells/<i>_<j>_<k>.json."""
 
     format: Literal["farfield-cell"] = "farfield-cell"
-    version: Literal[1] = VERSION
+    version: Annotated[Literal[1], WHOLE] = VERSION
     cell: tuple[int, int, int]
     eyes: Annotated[tuple[Triple, ...], Field(min_length=1)]
     quads: Quads

@@ -293,3 +293,13 @@ def test_far_texels_by_plain_loops() -> None:
         assert np.array_equal(far.seen, expected), n
         assert new == pytest.approx(len(first) / solid.size, abs=1 / solid.size)
     assert 0.2 < expected.mean() < 0.98
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 5), (5, 1), (2, 2), (7, 4), (16, 16)])
+@pytest.mark.parametrize("texels", [0, 1, 2])
+def test_farthest_around(shape: tuple[int, int], texels: int) -> None:
+    values = np.random.default_rng(7).random((*shape, 2), np.float32)[..., 0]
+    found = farthest_around(values, texels)
+    for y, x in np.ndindex(shape):
+        around = values[max(y - texels, 0) : y + texels + 1, max(x - texels, 0) : x + texels + 1]
+        assert found[y, x] == around.min()

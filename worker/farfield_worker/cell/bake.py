@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import resource
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
@@ -11,6 +10,7 @@ import numpy as np
 from farfield_core import layout
 from farfield_core.bake import settings_of
 from farfield_core.cells import Index
+from farfield_core.memory import peak_bytes
 from farfield_core.scene import PreparedScene
 from farfield_core.settings import BakeSettings
 from farfield_core.walk import CellFile, NearBlock, Walk
@@ -111,7 +111,7 @@ class CellBaker:
                 "atlas_bytes": sum(len(data) for data in files),
                 **impostors.figures,
                 **watch.figures(),
-                "peak_megabytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+                "peak_megabytes": peak_bytes() / 2**20,
             },
         )
         text = cell.model_dump_json()

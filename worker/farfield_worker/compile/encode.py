@@ -17,8 +17,9 @@ from PIL import Image
 
 from farfield_worker.compile.filters import filtered
 
-#: libdeflate's effort, 1 to 12
-LEVEL = 6
+#: libdeflate's effort, 1 to 12. Against 6, files of layered cells are 2.5 % smaller in 2.4 times as
+#: long; 10 would make them 4 % smaller still in 3 times as long again.
+LEVEL = 8
 
 _RGBA = 6
 

@@ -72,10 +72,11 @@ class Programs:
     ) -> moderngl.VertexArray:
         """Vertices for `features`: `buffers` by the names of `FORMATS`, uint32 `indices`."""
         program = self.get(features)
+        members = set(program)
         content = [
             (buffer, FORMATS[name], f"in_{name}")
             for name, buffer in buffers.items()
-            if f"in_{name}" in program  # a compiler drops what a material does not read
+            if f"in_{name}" in members  # a compiler drops what a material does not read
         ]
         return self._context.vertex_array(program, content, indices, index_element_size=4)
 

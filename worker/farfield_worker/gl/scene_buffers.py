@@ -6,7 +6,7 @@ from typing import Any
 
 import moderngl
 import numpy as np
-from farfield_core.scene import Batch, PreparedScene
+from farfield_core.scene import PreparedScene, Triple
 from numpy.typing import NDArray
 
 from farfield_worker.gl import context as gl
@@ -45,6 +45,8 @@ class SceneBuffers:
             for t in scene.info.textures
         ]
         self._features = [Features.of(batch) for batch in self.batches]
+        #: emissive factor and cutoff that each program has now
+        self._bound: dict[Features, tuple[Triple, float]] = {}
         self._programs = Programs(context, vertex_glsl, fragment_glsl)
         for features in self._features:
             self._programs.get(features)
@@ -61,13 +63,16 @@ class SceneBuffers:
         """Set uniforms in all programs."""
         self._programs.set(**values)
 
-    def bind(self, batch: Batch, cull: bool = True) -> None:
+    def bind(self, number: int, cull: bool = True) -> None:
         """Set a batch's textures, uniforms and, if `cull`, whether back faces are dropped."""
-        set_uniforms(
-            self._programs.get(Features.of(batch)),
-            emissive_factor=batch.emissive,
-            cutoff=batch.cutoff,
-        )
+        batch, features = self.batches[number], self._features[number]
+        bound = batch.emissive, batch.cutoff
+        # Setting a uniform takes as long as drawing a few triangles.
+        if self._bound.get(features) != bound:
+            self._bound[features] = bound
+            set_uniforms(
+                self._programs.get(features), emissive_factor=batch.emissive, cutoff=batch.cutoff
+            )
         if batch.texture is not None:
             self._textures[batch.texture].use(0)
         if batch.emissive_texture is not None:

@@ -65,8 +65,8 @@ class CulledRenderer:
         buffers = self._target.buffers
         buffers.set(layer=(float(depths[layer]), float(depths[layer + 1])))
         starts = lists.starts[layer]
-        for number in np.flatnonzero(starts[1:] > starts[:-1]):
-            buffers.bind(buffers.batches[number], cull=False)
+        for number in np.flatnonzero(starts[1:] > starts[:-1]).tolist():
+            buffers.bind(number, cull=False)
             first, end = int(starts[number]), int(starts[number + 1])
             self._arrays[number].render(vertices=3 * (end - first), first=3 * first)
         pixels = self._readback[: 2 * (x1 - x0) * (y1 - y0)]

@@ -50,8 +50,8 @@ class PlainRenderer:
     def _draw(self, least: float, greatest: float) -> None:
         buffers = self._target.buffers
         buffers.set(layer=(least, greatest))
-        for number, batch in enumerate(buffers.batches):
-            buffers.bind(batch, cull=False)
+        for number in range(len(buffers.batches)):
+            buffers.bind(number, cull=False)
             for block in self._scene.info.blocks:
                 for part in block.parts:
                     if part.batch == number:

@@ -92,7 +92,7 @@ class SceneShooter:
         for number, array in enumerate(self._arrays):
             first, end = int(starts[number]), int(starts[number + 1])
             if first < end:
-                self._buffers.bind(self._buffers.batches[number])
+                self._buffers.bind(number)
                 array.render_indirect(indirect, moderngl.TRIANGLES, end - first, first)
         indirect.release()
 

@@ -165,7 +165,7 @@ class ABuffer:
     def _draw(self, array: moderngl.VertexArray, batch: int, first: int, count: int) -> int:
         """Draw `count` triangles of a batch from the `first`; return how many fragments."""
         self._count.write(bytes(16))
-        self.buffers.bind(self.buffers.batches[batch], cull=False)
+        self.buffers.bind(batch, cull=False)
         set_uniforms(array.program, first=first)
         array.render(vertices=3 * count, first=3 * first)
         self.buffers.context.memory_barrier()

@@ -11,12 +11,13 @@ glass (BLEND) hides nothing: seen closer than a map shows it, either may have ho
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import moderngl
 import numpy as np
 from farfield_core.faces import FACES
 from farfield_core.scene import PreparedScene
+from numba import njit
 from numpy.typing import NDArray
 
 from farfield_worker.gl import context as gl
@@ -168,7 +169,7 @@ class NearMapRenderer:
         indices = context.buffer(vertices)
         arrays = self.buffers.vertex_arrays(indices)
         for batch in np.flatnonzero(np.diff(starts)).tolist():
-            self.buffers.bind(self.buffers.batches[batch], cull=False)
+            self.buffers.bind(batch, cull=False)
             set_uniforms(arrays[batch].program, first=first + int(starts[batch]))
             arrays[batch].render(
                 vertices=3 * int(starts[batch + 1] - starts[batch]), first=3 * int(starts[batch])
@@ -188,7 +189,21 @@ def farthest_around(disparity: NDArray[np.float32], texels: int = 1) -> NDArray[
     """Least disparity within `texels` of each texel of a map (h, w), both ways: (h, w) float32."""
     around = disparity
     for _ in range(texels):
-        grown = np.pad(around, 1, mode="edge")
-        rows = np.minimum(np.minimum(grown[:-2], grown[1:-1]), grown[2:])
-        around = np.minimum(np.minimum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:])
+        around = _least_of_nine(around)
     return around
+
+
+@njit(cache=True)
+def _least_of_nine(values: Any) -> Any:
+    """Least of each value and its eight neighbours, those outside (h, w) left out."""
+    h, w = values.shape
+    rows, out = np.empty((h, w), np.float32), np.empty((h, w), np.float32)
+    for y in range(h):
+        above, below = max(y - 1, 0), min(y + 1, h - 1)
+        for x in range(w):
+            rows[y, x] = min(values[above, x], values[y, x], values[below, x])
+    for y in range(h):
+        for x in range(w):
+            left, right = max(x - 1, 0), min(x + 1, w - 1)
+            out[y, x] = min(rows[y, left], rows[y, x], rows[y, right])
+    return out

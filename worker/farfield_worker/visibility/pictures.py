@@ -85,7 +85,7 @@ class Pictures:
             arrays = self.buffers.vertex_arrays(indices)
             starts = triangles.starts
             for batch in np.flatnonzero(np.diff(starts)).tolist():
-                self.buffers.bind(self.buffers.batches[batch], cull=False)
+                self.buffers.bind(batch, cull=False)
                 first, count = int(starts[batch]), int(starts[batch + 1] - starts[batch])
                 set_uniforms(arrays[batch].program, first=first)
                 arrays[batch].render(vertices=3 * count, first=3 * first)

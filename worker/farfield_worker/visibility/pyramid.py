@@ -31,10 +31,12 @@ def not_behind(clusters: InView, drawn: NDArray[np.float32]) -> InView:
 
 def _halve(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Minima of 2 x 2 values; odd edges are continued."""
-    h, w = values.shape
-    even = np.pad(values, ((0, h % 2), (0, w % 2)), mode="edge")
-    rows = np.minimum(even[::2], even[1::2])
-    return np.minimum(rows[:, ::2], rows[:, 1::2])
+    h, w = values.shape[0] // 2, values.shape[1] // 2
+    rows = values[::2].copy()
+    np.minimum(rows[:h], values[1::2], out=rows[:h])
+    least = rows[:, ::2].copy()
+    np.minimum(least[:, :w], rows[:, 1::2], out=least[:, :w])
+    return least
 
 
 @njit(cache=True)

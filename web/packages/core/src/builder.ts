@@ -12,12 +12,15 @@ import {
   type Triangles,
 } from './objects/find-objects.js';
 import { buildQuadVertices, type QuadVertices } from './quads.js';
+import { sortBySector, type Sectors } from './sectors.js';
 import { buildSolid, type SolidData } from './solid.js';
 
 /** What a cell file says, ready to upload. */
 export interface BuiltCell {
   readonly centre: Vec3;
-  readonly far: QuadVertices;
+  readonly far: Omit<QuadVertices, 'indices'>;
+  /** The far triangles, in the order in which they are drawn. */
+  readonly sectors: Sectors;
   readonly atlases: readonly string[];
   readonly near: readonly NearReference[];
 }
@@ -52,9 +55,11 @@ export function buildCell(bytes: ArrayBuffer, resolution: number): BuiltCell {
   if (format !== 'farfield-cell' || version !== WALK_VERSION) {
     throw new FarfieldError('format', 'A cell file is not of the version this viewer reads.');
   }
+  const { indices, ...far } = buildQuadVertices(cell, resolution);
   return {
     centre: cell.eyes[0],
-    far: buildQuadVertices(cell, resolution),
+    far,
+    sectors: sortBySector(far.positions, indices),
     atlases: cell.atlases,
     near: cell.near,
   };
@@ -156,11 +161,10 @@ export function answer(request: BuildRequest): { reply: BuildReply; transfer: Ar
   try {
     if (request.kind === 'cell') {
       const value = buildCell(request.bytes, request.resolution);
-      const { positions, texels, indices } = value.far;
-      return {
-        reply: { id: request.id, value },
-        transfer: [positions.buffer, texels.buffer, indices.buffer],
-      };
+      const { far, sectors } = value;
+      const { indices, starts, boxes } = sectors;
+      const arrays = [far.positions, far.texels, indices, starts, boxes];
+      return { reply: { id: request.id, value }, transfer: arrays.map(({ buffer }) => buffer) };
     }
     if (request.kind === 'objects') {
       const value = findObjects(request.batches, request.options);

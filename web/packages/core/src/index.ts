@@ -17,6 +17,7 @@ export * from './near-material.js';
 export * from './objects/index.js';
 export * from './prefetch.js';
 export * from './quads.js';
+export * from './sectors.js';
 export * from './shared-store.js';
 export * from './solid.js';
 export * from './upload-scheduler.js';

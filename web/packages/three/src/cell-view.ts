@@ -1,12 +1,21 @@
-/** One complete cell as three.js objects: one mesh for all far quads, one per near draw state. */
+/** One complete cell as three.js objects: two meshes for all far quads, one per near draw state. */
 
-import { PAGES, type BuiltCell, type NearBatch, type Solid } from '@farfield/core';
+import {
+  PAGES,
+  visibleRange,
+  type BuiltCell,
+  type NearBatch,
+  type Sectors,
+  type Solid,
+} from '@farfield/core';
 import {
   BufferAttribute,
   BufferGeometry,
   Group,
+  Matrix4,
   Mesh,
   Sphere,
+  type Camera,
   type RawShaderMaterial,
 } from 'three';
 import type { CellCopies } from './objects/cell-copies.js';
@@ -16,7 +25,10 @@ export type WalkMesh = Mesh<BufferGeometry, RawShaderMaterial>;
 
 export class CellView {
   readonly group = new Group();
+  /** Far triangles in the directions that a camera sees. */
   readonly far: WalkMesh | undefined;
+  /** Far triangles that lie in too many directions to choose from; its buffers are `far`'s. */
+  readonly wide: WalkMesh | undefined;
   readonly near: readonly WalkMesh[];
   readonly quads: number;
   readonly nearTriangles: number;
@@ -28,6 +40,7 @@ export class CellView {
   readonly copies: CellCopies | undefined;
   /** Which pixels it is drawn at, see `FADE_GLSL`. */
   fade = 0;
+  private readonly sectors: Sectors;
   private readonly release: () => void;
 
   /**
@@ -50,6 +63,7 @@ export class CellView {
     this.copies = copies;
     this.release = release;
     this.solid = solid;
+    this.sectors = cell.sectors;
     this.quads = cell.far.quads;
     this.group.name = 'farfield cell';
     this.group.position.set(...cell.centre);
@@ -58,14 +72,33 @@ export class CellView {
     this.near = batches.map((batch, n) =>
       mesh(nearGeometry(batch), nearMaterials[n], n / batches.length),
     );
-    this.far = this.quads === 0 ? undefined : mesh(farGeometry(cell, slots), farMaterial, 1);
-    for (const object of this.near) this.group.add(object);
-    if (this.far !== undefined) this.group.add(this.far);
+    if (this.quads > 0) {
+      const geometry = farGeometry(cell, slots);
+      this.far = mesh(geometry, farMaterial, 1.01);
+      if (cell.sectors.wide > 0)
+        this.wide = mesh(part(geometry, cell.sectors.wide), farMaterial, 1);
+    }
+    for (const object of [...this.near, ...this.farMeshes]) this.group.add(object);
     if (copies !== undefined) this.group.add(...copies.meshes);
     this.nearTriangles = batches.reduce((sum, { indices }) => sum + indices.length / 3, 0);
     this.bytes = this.geometries.reduce((sum, geometry) => sum + geometryBytes(geometry), 0);
   }
 
+  /** What far quads are drawn with. */
+  get farMeshes(): WalkMesh[] {
+    return [this.wide, this.far].filter((object) => object !== undefined);
+  }
+
+  /** Have only those far triangles drawn that a camera may see. */
+  aim(camera: Camera): void {
+    if (this.far === undefined) return;
+    matrix.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);
+    const { elements } = matrix.multiply(this.far.matrixWorld);
+    const { start, count } = visibleRange(this.sectors, elements);
+    this.far.geometry.setDrawRange(start, count);
+  }
+
+  /** All buffers, each once. */
   get geometries(): BufferGeometry[] {
     return [...this.near, ...(this.far === undefined ? [] : [this.far])].map(
       ({ geometry }) => geometry,
@@ -80,10 +113,13 @@ export class CellView {
   dispose(): void {
     this.group.removeFromParent();
     for (const geometry of this.geometries) geometry.dispose();
+    this.wide?.geometry.dispose();
     this.copies?.dispose();
     this.release();
   }
 }
+
+const matrix = new Matrix4();
 
 function mesh(geometry: BufferGeometry, material: RawShaderMaterial, order: number): WalkMesh {
   // Computing bounds would read every vertex; a cell is always in view.
@@ -95,7 +131,18 @@ function mesh(geometry: BufferGeometry, material: RawShaderMaterial, order: numb
   return object;
 }
 
-function farGeometry({ far }: BuiltCell, slots: readonly number[]): BufferGeometry {
+/** The first `count` corners of a geometry, over the same buffers. */
+function part(whole: BufferGeometry, count: number): BufferGeometry {
+  const geometry = new BufferGeometry();
+  for (const [name, attribute] of Object.entries(whole.attributes)) {
+    geometry.setAttribute(name, attribute);
+  }
+  geometry.setIndex(whole.index);
+  geometry.setDrawRange(0, count);
+  return geometry;
+}
+
+function farGeometry({ far, sectors }: BuiltCell, slots: readonly number[]): BufferGeometry {
   const { texels } = far;
   for (let n = 2; n < texels.length; n += 3) {
     // one number of each kind, see QuadVertices
@@ -106,7 +153,7 @@ function farGeometry({ far }: BuiltCell, slots: readonly number[]): BufferGeomet
   const geometry = new BufferGeometry();
   geometry.setAttribute('position', new BufferAttribute(far.positions, 4));
   geometry.setAttribute('texel', new BufferAttribute(texels, 3));
-  geometry.setIndex(new BufferAttribute(far.indices, 1));
+  geometry.setIndex(new BufferAttribute(sectors.indices, 1));
   return geometry;
 }
 

@@ -54,7 +54,10 @@ out vec4 color;
 ${FADE_GLSL}
 void main() {
   // a plane between this eye and the quad's own shows no picture of its other side
-  if (ff_faded() || (v_one_sided != 0 && !gl_FrontFacing)) discard;
+  if (v_one_sided != 0 && !gl_FrontFacing) discard;
+#ifdef FADE
+  if (ff_faded()) discard;
+#endif
   vec4 texel = texelFetch(ff_pages, ivec3(floor(v_texel), v_slot), 0);
   if (texel.a < 0.5) discard;
   color = vec4(texel.rgb, 1.0);
@@ -64,16 +67,18 @@ void main() {
 }
 `;
 
-/** Pages to sample, and the fade of the cell that is drawn next. */
+/** Pages to sample, the fade of the cell that is drawn next, and whether cells ever fade. */
 export function createFarMaterial(
   pages: DataArrayTexture,
   fade: IUniform<number>,
+  fades: boolean,
 ): RawShaderMaterial {
   return new RawShaderMaterial({
     name: 'farfield far',
     glslVersion: GLSL3,
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
+    defines: fades ? { FADE: '' } : {},
     uniforms: { ff_pages: { value: pages }, ff_fade: fade },
     side: DoubleSide,
     depthFunc: LessDepth,

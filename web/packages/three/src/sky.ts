@@ -1,5 +1,6 @@
 /** The light model's sky behind everything: one triangle at the far end of the depth range. */
 
+import type { Light } from '@farfield/core';
 import {
   BufferAttribute,
   BufferGeometry,
@@ -9,8 +10,7 @@ import {
   RawShaderMaterial,
   type IUniform,
 } from 'three';
-import type { Uniforms } from './light.js';
-import { LIGHT_GLSL } from './shading.generated.js';
+import { lightGlsl } from './light.js';
 
 const VERTEX = `
 precision highp float;
@@ -26,13 +26,13 @@ void main() {
 }
 `;
 
-const FRAGMENT = `
+const fragment = (light: Light): string => `
 precision highp float;
 precision highp int;
 uniform float ff_alpha;
 in vec3 v_direction;
 out vec4 color;
-${LIGHT_GLSL}
+${lightGlsl(light)}
 void main() {
   color = vec4(ff_to_srgb(ff_sky(v_direction)), ff_alpha);
 }
@@ -41,7 +41,7 @@ void main() {
 export type Sky = Mesh<BufferGeometry, RawShaderMaterial>;
 
 /** The background; `alpha` is written as the canvas's alpha, so 0 marks background pixels. */
-export function createSky(light: Uniforms, alpha: IUniform<number>): Sky {
+export function createSky(light: Light, alpha: IUniform<number>): Sky {
   const geometry = new BufferGeometry();
   const corners = new Float32Array([-1, -1, 0, 3, -1, 0, -1, 3, 0]);
   geometry.setAttribute('position', new BufferAttribute(corners, 3));
@@ -49,8 +49,8 @@ export function createSky(light: Uniforms, alpha: IUniform<number>): Sky {
     name: 'farfield sky',
     glslVersion: GLSL3,
     vertexShader: VERTEX,
-    fragmentShader: FRAGMENT,
-    uniforms: { ...light, ff_alpha: alpha },
+    fragmentShader: fragment(light),
+    uniforms: { ff_alpha: alpha },
     depthFunc: LessEqualDepth,
     depthWrite: false,
     toneMapped: false,

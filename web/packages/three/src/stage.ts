@@ -15,7 +15,6 @@ import { CellLoader } from './cell-loader.js';
 import type { CellView } from './cell-view.js';
 import { fadeWith } from './fade.js';
 import { createFarMaterial } from './far-material.js';
-import { lightUniforms } from './light.js';
 import { NearMaterials } from './near-materials.js';
 import { NearTextures } from './near-textures.js';
 import { Shapes } from './objects/shapes.js';
@@ -37,6 +36,8 @@ export interface StageOptions {
   /** Draw objects that repeat as true impostors where that is wanted. */
   readonly repeats: boolean;
   readonly backgroundAlpha: IUniform<number>;
+  /** Whether cells ever fade. */
+  readonly fades: boolean;
   readonly onReady: (cell: Cell, seconds: number) => void;
   readonly onError: (cell: Cell, error: Error) => void;
 }
@@ -60,7 +61,7 @@ export class Stage {
 
   constructor(options: StageOptions) {
     const { renderer, manifest, index, queue, builder, group } = options;
-    const light = lightUniforms(manifest.walk.light);
+    const { light, near_field } = manifest.walk;
     const { uploads } = this;
     const pressure = (priority: number): boolean => this.streamer.evict(priority);
     this.attributes = new AttributeUpload(uploads);
@@ -82,8 +83,8 @@ export class Stage {
       ),
       pressure,
     });
-    this.materials = new NearMaterials(light, manifest.walk.near_field);
-    this.farMaterial = createFarMaterial(this.pages.texture, this.materials.fade);
+    this.materials = new NearMaterials(light, near_field, options.fades);
+    this.farMaterial = createFarMaterial(this.pages.texture, this.materials.fade, options.fades);
     this.shapes = options.repeats
       ? new Shapes(manifest, queue, SHAPE_SHARE * options.textureBytes)
       : undefined;
@@ -135,17 +136,24 @@ export class Stage {
     this.sky?.material.dispose();
   }
 
-  /** Tell meshes of their cell's fade, near ones where the top of the picture is, for the dither pattern. */
+  /**
+   * Tell meshes of their cell's fade; far ones what the camera sees, near ones where the top of the
+   * picture is, for the dither pattern.
+   */
   private prepare(view: CellView): void {
     const { fade, top } = this.materials;
     const viewport = new Vector4();
-    const { far } = view;
-    if (far !== undefined) far.onBeforeRender = () => fadeWith(view, far, fade);
     for (const mesh of view.copies?.meshes ?? []) {
       const prepare = mesh.onBeforeRender.bind(mesh);
       mesh.onBeforeRender = (...all) => {
         fade.value = view.fade;
         prepare(...all);
+      };
+    }
+    for (const mesh of view.farMeshes) {
+      mesh.onBeforeRender = (_renderer, _scene, camera) => {
+        fadeWith(view, mesh, fade);
+        if (mesh === view.far) view.aim(camera);
       };
     }
     for (const mesh of view.near) {

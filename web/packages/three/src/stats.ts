@@ -37,7 +37,7 @@ export interface StatsSource {
 
 export function readStats(source: StatsSource): WalkStats {
   const { stage, view, cell, queue, loadSeconds, textureCap } = source;
-  const far = view?.far === undefined ? 0 : 1;
+  const far = view?.farMeshes.length ?? 0;
   const near = view?.near.length ?? 0;
   return {
     cell: cell?.name,

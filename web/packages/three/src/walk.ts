@@ -296,6 +296,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
       sky: this.options.sky ?? true,
       repeats: ['auto', 'copies'].includes(this.objects.near),
       backgroundAlpha: this.alpha,
+      fades: (this.options.fade ?? 0) > 0,
       onReady: (cell, seconds) => {
         this.loadSeconds += (seconds - this.loadSeconds) * (this.loadSeconds === 0 ? 1 : 0.2);
         this.dispatchEvent({ type: 'cell-ready', cell, seconds });

@@ -3,6 +3,7 @@ import {
   Solid,
   buildSolid,
   findObjects,
+  sortBySector,
   type NearBatch,
   type NearState,
 } from '@farfield/core';
@@ -59,13 +60,9 @@ function batchOf(places: readonly number[]): NearBatch {
 }
 
 function viewOf(batches: NearBatch[]): CellView {
-  const far = {
-    quads: 0,
-    positions: new Float32Array(0),
-    texels: new Float32Array(0),
-    indices: new Uint32Array(0),
-  };
-  const cell = { centre: [5, 0, 0] as const, far, atlases: [], near: [] };
+  const far = { quads: 0, positions: new Float32Array(0), texels: new Float32Array(0) };
+  const sectors = sortBySector(far.positions, new Uint32Array(0));
+  const cell = { centre: [5, 0, 0] as const, far, sectors, atlases: [], near: [] };
   const material = new RawShaderMaterial();
   const materials = batches.map(() => material);
   const solid = new Solid(buildSolid([], [1, 2, 3], [8, 8, 8]));

@@ -23,7 +23,7 @@ import { readFileSync } from 'node:fs';
 import { AttributeUpload } from '../src/attribute-upload.js';
 import { CellView } from '../src/cell-view.js';
 import { createFarMaterial, quadOf } from '../src/far-material.js';
-import { lightUniforms } from '../src/light.js';
+import { lightGlsl, lightUniforms } from '../src/light.js';
 import { MotionTracker } from '../src/motion.js';
 import { NearMaterials } from '../src/near-materials.js';
 import { LIGHT_GLSL } from '../src/shading.generated.js';
@@ -60,6 +60,10 @@ describe('the light model', () => {
   test('every uniform of the GLSL has a value, and no value is without a uniform', () => {
     const declared = [...LIGHT_GLSL.matchAll(/uniform vec3 (\w+);/g)].map(([, name]) => name);
     expect(Object.keys(lightUniforms(LIGHT)).sort()).toEqual(declared.sort());
+    const glsl = lightGlsl(LIGHT);
+    expect(glsl).not.toContain('uniform');
+    expect(glsl).toContain('const vec3 ff_ambient = vec3(1e-1, 1e-1, 1e-1);');
+    for (const name of declared) expect(glsl).toContain(`const vec3 ${name} =`);
   });
 });
 
@@ -107,19 +111,24 @@ describe('MotionTracker', () => {
 
 describe('NearMaterials', () => {
   test('states share materials, and programs differ only where they must', () => {
-    const materials = new NearMaterials(lightUniforms(LIGHT), 20);
+    const materials = new NearMaterials(LIGHT, 20, false);
     const plain = materials.get(STATE);
     expect(materials.get({ ...STATE })).toBe(plain);
-    expect(plain.defines).toEqual({});
+    expect(plain.defines).toEqual({ NEAR_FIELD: '2.125e+1' });
     const map = { uri: 'a', wrapS: 'repeat', wrapT: 'repeat', filter: 'linear' } as const;
     const [first, second] = [new Texture(), new Texture()];
     const textured = materials.get({ ...STATE, map, alpha: 'mask' }, first);
-    expect(textured.defines).toEqual({ MAP: '', MASK: '' });
+    expect(textured.defines).toEqual({ ...plain.defines, MAP: '', MASK: '' });
     expect(materials.get({ ...STATE, map, alpha: 'mask' }, second)).toBe(textured);
     expect(textured.uniforms.ff_map.value).toBe(second);
-    expect(textured.uniforms.ff_near_field.value).toBe(21.25);
-    expect(textured.uniforms.ff_sun).toBe(plain.uniforms.ff_sun);
+    expect(textured.uniforms.ff_fade).toBe(plain.uniforms.ff_fade);
+    const shiny = { ...STATE, emissive: [0, 0.5, 0], unlit: true, doubleSided: true } as const;
+    expect(materials.get(shiny).defines).toEqual({
+      ...plain.defines,
+      ...{ EMISSIVE: '', UNLIT: '', BOTH_SIDES: '' },
+    });
     materials.dispose();
+    expect(new NearMaterials(LIGHT, Infinity, true).get(STATE).defines).toEqual({ FADE: '' });
   });
 });
 
@@ -152,7 +161,7 @@ describe('CellView', () => {
     const bytes = new TextEncoder().encode(JSON.stringify(cell)).buffer;
     const built = await new InlineBuilder().cell(bytes, 64);
     let released = 0;
-    const material = createFarMaterial({} as never, { value: 0 });
+    const material = createFarMaterial({} as never, { value: 0 }, false);
     const view = new CellView(built, [7, 3], material, [], [], EMPTY, () => released++);
     const slots = [...(view.far?.geometry.attributes.texel.array ?? [])].filter(
       (_, n) => n % 3 === 2,

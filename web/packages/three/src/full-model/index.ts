@@ -19,7 +19,6 @@ import {
   Vector3,
   Vector4,
 } from 'three';
-import { lightUniforms } from '../light.js';
 import { NearMaterials } from '../near-materials.js';
 import { decodeImage } from '../strip-upload.js';
 import { cutChunks } from './chunks.js';
@@ -87,7 +86,7 @@ export class FullModel {
   /** @param url the folder of the prepared scene, ending in a slash */
   constructor(url: string, options: FullModelOptions) {
     this.group.name = 'farfield full model';
-    this.materials = new NearMaterials(lightUniforms(options.light), 1e30);
+    this.materials = new NearMaterials(options.light, Infinity, false);
     this.loaded = this.load(url, options);
     this.loaded.catch(() => undefined);
   }

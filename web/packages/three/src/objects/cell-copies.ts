@@ -4,10 +4,16 @@
  * pixels a view has, so copies are ordered by it, and both are drawn up to or from one of them.
  */
 
-import { sortByCopy, switchFocal, type CellSpace, type Copy, type NearBatch } from '@farfield/core';
+import {
+  sortByCopy,
+  switchFocal,
+  type CellSpace,
+  type Copy,
+  type Light,
+  type NearBatch,
+} from '@farfield/core';
 import type { IUniform } from 'three';
 import type { WalkMesh } from '../cell-view.js';
-import type { Uniforms } from '../light.js';
 import { TrueImpostors, type BakedObject } from './true-impostors.js';
 
 /** Steps of a ray for each pixel: open sheets are as thin as a texel. */
@@ -18,7 +24,7 @@ export interface CellCopiesOptions {
   /** Objects by name; what is missing stays polygons. */
   readonly shapes: ReadonlyMap<string, BakedObject>;
   readonly space: CellSpace;
-  readonly light: Uniforms;
+  readonly light: Light;
   readonly fade: IUniform<number>;
 }
 

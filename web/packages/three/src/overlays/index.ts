@@ -66,7 +66,8 @@ export class Overlays {
     const material = view?.far?.material;
     if (material !== undefined && this.tint !== (material.defines.TINT !== undefined)) {
       const layered = (this.walk.manifest?.walk.layers.length ?? 0) > 0;
-      material.defines = this.tint ? { TINT: layered ? 2 : 1 } : {};
+      if (this.tint) material.defines.TINT = layered ? 2 : 1;
+      else delete material.defines.TINT;
       material.needsUpdate = true;
     }
     const geometry = this.outlines ? view?.far?.geometry : undefined;
