@@ -4,7 +4,9 @@
 
 - `forest_ratio`: frame time of a walk through the forest, near field 100 m, with near-field objects
   as impostors : without; `forest_flip`: mean FLIP between the two;
-- `load_worst`: worst frame : median while 500 objects, a tenth of them animated, are regenerated;
+- `load_worst`: worst frame : median while 500 objects, a tenth of them animated, are regenerated,
+  `load_still_worst` the same while nothing is; those in processor time count that of the page and
+  of the graphics process, which other programs do not lengthen;
 - `true_ratio`: frame time of 10,000 true impostors : instances of the mesh of 5,120 triangles;
 - `silhouette`: share of the mesh's outline pixels more than a pixel from the impostor's, 100
   directions, where a texel is a pixel;
@@ -33,6 +35,7 @@ from farfield_worker.objects.command import bake_object
 from farfield_worker.objects.error import outline_distance, sphere
 from playwright.sync_api import Browser, sync_playwright
 
+from bench.browser import Meter
 from bench.stand import report
 from tests.browser.conftest import FLAGS, WEB
 from tests.browser.example import Example, Pixels
@@ -44,6 +47,9 @@ NEAR = 100.0
 CELL = 6.0
 BLOCKS, FRAMES = 8, 12
 DIRECTIONS = 100
+LOAD_FRAMES = 200
+#: frames after which `auto` has tried all ways
+TRIAL = 180
 
 
 def figures() -> dict[str, Any]:
@@ -174,6 +180,11 @@ def forest(browser: Browser, server: WalkServer) -> dict[str, Any]:
         one.call("return objects.stand.renderer.info.render.triangles") for one in (without, with_)
     ]
     close(without, with_)
+    auto = example(browser, server, f"show=walk&near=auto&walk={at}")
+    auto.call(WALK)
+    auto.call("for (let n = 0; n < args[0]; n++) objects.stand.measure(0, 1, 0)", TRIAL)
+    chosen = auto.call("return objects.hooks.walk.objects.way")
+    close(auto)
     median = {name: float(np.median(values)) for name, values in times.items()}
     return {
         "forest_ratio": median["with"] / median["without"],
@@ -182,6 +193,7 @@ def forest(browser: Browser, server: WalkServer) -> dict[str, Any]:
         "forest_ms": median,
         "forest_triangles": {"without": triangles[0], "with": triangles[1]},
         "forest_objects": stats,
+        "forest_auto": chosen,
     }
 
 
@@ -192,18 +204,62 @@ def flip(a: Pixels, b: Pixels) -> float:
 
 
 def load(browser: Browser, server: WalkServer) -> dict[str, Any]:
-    """500 objects, of which 50 turn: frames while pictures are taken all the time."""
-    one = example(browser, server, "show=many&count=500&moving=0.1")
-    one.call("objects.stand.measure(0, 150, 0.03)")
-    times = np.array(one.call("return objects.stand.measure(4.5, 200, 0.03)"))
-    taken = one.stats()["takenInAll"]
-    close(one)
+    """500 objects, of which 50 turn: frames while pictures are taken all the time.
+
+    Beside them frames of the same page in which nothing changes, by turns: what their worst is
+    above their median other programs have done.
+    """
+    busy, still = (
+        example(browser, server, f"show=many&count=500&moving={moving}") for moving in (0.1, 0)
+    )
+    for one in (busy, still):
+        one.call("for (let n = 0; n < 150; n++) objects.stand.measure(args[0] * n, 1, 1)", 0.03)
+    meter = Meter()
+    times: dict[str, list[float]] = {"busy": [], "still": [], "spent": []}
+    for frame in range(LOAD_FRAMES):
+        before = meter.milliseconds()
+        times["busy"] += busy.call(
+            "return objects.stand.measure(args[0], 1, 0)", 4.5 + 0.03 * frame
+        )
+        times["spent"].append(meter.milliseconds() - before)
+        times["still"] += still.call("return objects.stand.measure(4.5, 1, 0)")
+    taken = busy.stats()["takenInAll"]
+    close(busy, still)
+
+    def worst(name: str, share: float = 1.0) -> float:
+        return float(np.quantile(times[name], share) / np.median(times[name]))
+
     return {
-        "load_worst": float(times.max() / np.median(times)),
-        "load_p95": float(np.quantile(times, 0.95) / np.median(times)),
-        "load_ms": float(np.median(times)),
+        "load_worst": worst("busy"),
+        "load_p95": worst("busy", 0.95),
+        "load_still_worst": worst("still"),
+        "load_still_p95": worst("still", 0.95),
+        "load_worst_processor": worst("spent"),
+        "load_p95_processor": worst("spent", 0.95),
+        "load_ms": float(np.median(times["busy"])),
         "load_pictures_taken": taken,
+    } | first(browser, server)
+
+
+def first(browser: Browser, server: WalkServer) -> dict[str, Any]:
+    """The frames in which 500 objects get their first pictures : frames of the objects themselves.
+
+    The first three frames, which compile programs and bring up buffers either way, do not count.
+    """
+    spent: dict[str, list[float]] = {"with": [], "without": []}
+    pages = {
+        name: example(browser, server, f"show=many&count=500&moving=0.1{query}")
+        for name, query in (("with", ""), ("without", "&without"))
     }
+    meter = Meter()
+    for frame in range(40):
+        for name, page in pages.items():
+            before = meter.milliseconds()
+            page.call("objects.stand.measure(args[0], 1, 0)", 0.03 * frame)
+            if frame >= 3:
+                spent[name].append(meter.milliseconds() - before)
+    close(*pages.values())
+    return {"first_worst_processor": max(spent["with"]) / float(np.median(spent["without"]))}
 
 
 def stones(browser: Browser, server: WalkServer) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from farfield_core import format as walk_format
 from farfield_core.errors import BadInputError
+from farfield_core.object_file import ObjectFile, object_faults
 from farfield_core.walk import CellFile, CellTable, Walk
 from farfield_shading import default_light
 from hypothesis import given
@@ -19,11 +20,13 @@ MODELS: dict[walk_format.Kind, type[BaseModel]] = {
     "walk": Walk,
     "cell": CellFile,
     "page": CellTable,
+    "object": ObjectFile,
 }
 FILES: dict[walk_format.Kind, str] = {
     "walk": "walk.json",
     "cell": "cells/0_0_0.json",
     "page": "pages/0.json",
+    "object": "object.json",
 }
 
 
@@ -188,3 +191,16 @@ def test_faults_of_cells_are_found(path: str, value: Any, fault: str) -> None:
 def test_faults_of_walks_are_found(path: str, value: Any, fault: str) -> None:
     walk = change(Walk.model_validate(example("walk")), path, value)
     assert any(found.startswith(fault) for found in walk_format.walk_faults(walk))
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "fault"),
+    [
+        ("axes", [0, 0, 2], "The axes of an object are not x, y and z in some order."),
+        ("high.1", -50.0, "The box of an object is empty."),
+    ],
+)
+def test_faults_of_objects_are_found(path: str, value: Any, fault: str) -> None:
+    file = ObjectFile.model_validate(example("object"))
+    assert list(object_faults(file)) == []
+    assert list(object_faults(change(file, path, value))) == [fault]

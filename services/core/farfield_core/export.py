@@ -91,19 +91,27 @@ def _files(store: Store, bake: str, tell: Progress) -> Iterator[tuple[str, bytes
                 known.add(name)
                 content = store.get(place)
                 yield name, content
-                for texture in _textures(name, content):
-                    if f"near/{texture}" not in known:
-                        known.add(f"near/{texture}")
-                        yield f"near/{texture}", store.get(layout.near_key(texture))
+                waiting = siblings(name, content)
+                while waiting:
+                    sibling = waiting.pop()
+                    if f"near/{sibling}" not in known:
+                        known.add(f"near/{sibling}")
+                        beside = store.get(layout.near_key(sibling))
+                        yield f"near/{sibling}", beside
+                        waiting += siblings(sibling, beside)
         yield f"cells/{key.rsplit('/', 1)[1]}", data
         tell(number + 1, len(cells))
     yield "walk.json", relocate(walk, PLACES).model_dump_json().encode()
 
 
-def _textures(name: str, content: bytes) -> list[str]:
-    """Names of the textures that a near block has beside it (docs/format.md)."""
+def siblings(name: str, content: bytes) -> list[str]:
+    """Names of the files that a near block, or an object of one, has beside it (docs/format.md)."""
+    if name.endswith(".json"):
+        return [str(json.loads(content)["image"])]
     if not name.endswith(".glb"):
         return []
     (length,) = struct.unpack_from("<I", content, 12)
-    images = json.loads(content[20 : 20 + length]).get("images", [])
-    return [str(image["uri"]) for image in images if "uri" in image]
+    root = json.loads(content[20 : 20 + length])
+    textures = [str(image["uri"]) for image in root.get("images", []) if "uri" in image]
+    objects = root.get("extras", {}).get("objects", {})
+    return textures + [str(shape) for shape in objects.get("shapes", [])]

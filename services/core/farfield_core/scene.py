@@ -9,6 +9,9 @@ A folder `prepared/` holds
     colors.npy       (n, 4) uint16, linear base colour factor times vertex colour, times 65535
     triangles.npy    (m, 3) uint32, indices into the vertices
     textures/<name>  PNG files, sRGB, straight alpha
+    repeats.json     objects of which the scene has several copies, if any (`Repeats`)
+    owners.npy       (m, 1) int32, the copy that each triangle is part of, or -1; with repeats.json
+    objects/<name>   each of those objects as a true impostor (docs/format.md)
     map.png, thumbnail.png
 
 Triangles are sorted by block, inside a block by batch, inside a batch along a space-filling curve;
@@ -141,6 +144,22 @@ class SceneInfo(_Model):
     suspected: Suspicion | None = None
 
 
+class Repeats(_Model):
+    """repeats.json: objects that repeat, and their copies.
+
+    Attributes:
+        shapes: object files in `objects/`.
+        shape: for each copy which of them it is; -1 where none does it justice.
+        places: where each copy stands in scene coordinates, and its scale.
+        turns: unit quaternions x, y, z, w.
+    """
+
+    shapes: tuple[str, ...]
+    shape: tuple[int, ...]
+    places: tuple[tuple[float, float, float, float], ...]
+    turns: tuple[tuple[float, float, float, float], ...]
+
+
 @dataclass(frozen=True)
 class PreparedScene:
     """A prepared scene, its arrays mapped from disk (shapes in the module's docstring)."""
@@ -152,6 +171,8 @@ class PreparedScene:
     uvs: NDArray[np.float32]
     colors: NDArray[np.uint16]
     triangles: NDArray[np.uint32]
+    repeats: Repeats | None = None
+    owners: NDArray[np.int32] | None = None
 
     @property
     def origin(self) -> NDArray[np.float64]:
@@ -176,4 +197,9 @@ def map_scene(folder: Path, info: SceneInfo) -> PreparedScene:
     arrays: dict[str, Any] = {
         name: np.load(folder / f"{name}.npy", mmap_mode="r") for name in ARRAYS
     }
-    return PreparedScene(folder, info, **arrays)
+    try:
+        text = (folder / "repeats.json").read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return PreparedScene(folder, info, **arrays)
+    arrays["owners"] = np.load(folder / "owners.npy", mmap_mode="r")
+    return PreparedScene(folder, info, **arrays, repeats=Repeats.model_validate_json(text))

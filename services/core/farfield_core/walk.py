@@ -26,7 +26,9 @@ Text = Annotated[str, Field(min_length=1)]
 Folder = Annotated[str, Field(pattern="/$")]
 
 
-class _Model(BaseModel):
+class StrictModel(BaseModel):
+    """A document: read as JSON it has to be complete."""
+
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     @model_validator(mode="after")
@@ -38,7 +40,7 @@ class _Model(BaseModel):
         return self
 
 
-class WalkScene(_Model):
+class WalkScene(StrictModel):
     """What a walk says of its scene."""
 
     id: Text
@@ -47,7 +49,7 @@ class WalkScene(_Model):
     bounds: Bounds
 
 
-class CellPage(_Model):
+class CellPage(StrictModel):
     """A slice of a large corridor's cells, kept in a file of its own."""
 
     href: Text
@@ -55,7 +57,7 @@ class CellPage(_Model):
     bounds: Bounds
 
 
-class CellTable(_Model):
+class CellTable(StrictModel):
     """Cells by column: lattice index and lowest y of each."""
 
     i: tuple[int, ...]
@@ -64,7 +66,7 @@ class CellTable(_Model):
     y: tuple[float, ...]
 
 
-class WalkGrid(_Model):
+class WalkGrid(StrictModel):
     """The lattice of view cells: inline for small corridors, paged for large ones."""
 
     origin: Triple
@@ -80,7 +82,7 @@ class WalkGrid(_Model):
         return self
 
 
-class AtlasFormat(_Model):
+class AtlasFormat(StrictModel):
     """All atlas pages of a walk are of this size."""
 
     width: Annotated[int, Field(ge=1)]
@@ -88,7 +90,7 @@ class AtlasFormat(_Model):
     encoding: Literal["png", "webp"]
 
 
-class Places(_Model):
+class Places(StrictModel):
     """Where things lie, relative to walk.json; each ends in a slash."""
 
     cells: Folder = "cells/"
@@ -96,7 +98,7 @@ class Places(_Model):
     near: Folder = "../../blobs/near/"
 
 
-class Start(_Model):
+class Start(StrictModel):
     """Where a walker begins: an eye inside a cell, yaw and pitch in radians."""
 
     eye: Triple
@@ -104,7 +106,7 @@ class Start(_Model):
     pitch: float
 
 
-class Walk(_Model):
+class Walk(StrictModel):
     """walk.json."""
 
     format: Literal["farfield-walk"] = "farfield-walk"
@@ -129,7 +131,7 @@ class Walk(_Model):
         return self.near_field * OVERLAP
 
 
-class Quads(_Model):
+class Quads(StrictModel):
     """Quads by column, drawn front to back in this order.
 
     Quad q has `corner_counts[q]` corners, taken in turn from `corners`, which holds x, y pairs in
@@ -150,7 +152,7 @@ class Quads(_Model):
     turned: tuple[Annotated[int, Field(ge=0, le=1)], ...]
 
 
-class NearBlock(_Model):
+class NearBlock(StrictModel):
     """Triangles of one near block that belong to a cell.
 
     `ranges` holds (primitive, first triangle, triangles) triples, flat.
@@ -160,7 +162,7 @@ class NearBlock(_Model):
     ranges: tuple[Count, ...]
 
 
-class CellFile(_Model):
+class CellFile(StrictModel):
     """cells/<i>_<j>_<k>.json."""
 
     format: Literal["farfield-cell"] = "farfield-cell"

@@ -50,6 +50,7 @@ def mesh_of(corners: Floats) -> ObjectMesh:
     _, places = np.unique(exact, axis=0, return_inverse=True)
     return ObjectMesh(
         exact.reshape(-1, 3, 3).astype(np.float64),
+        np.asarray(scene.triangles, np.int64),
         places.reshape(-1, 3).astype(np.int64),
         np.zeros(len(corners), np.int64),
         scene,
@@ -113,7 +114,9 @@ def test_a_closed_mesh_is_entered_as_often_as_left(size: int) -> None:
 def test_slabs_are_where_a_point_is_inside() -> None:
     corners = scaled(np.concatenate([torus(), torus() @ np.diag([1, 1, -1])[:, [0, 2, 1]]]))
     size = 24
-    slabs = make_slabs(cross_columns(corners, size), size, 4, True, 0.0)
+    slabs = make_slabs(
+        found := cross_columns(corners, size), size, 4, True, np.zeros(len(found.height))
+    )
     assert slabs.closed == 0
     rng = np.random.default_rng(5)
     cells, heights = rng.integers(0, size, (400, 2)), rng.random(400)
@@ -135,7 +138,7 @@ def test_too_many_slabs_close_the_narrowest_gap() -> None:
     stack = np.concatenate(
         [sheet(z, up) for z, up in ((0.1, 0), (0.3, 1), (0.35, 0), (0.6, 1), (0.8, 0), (0.9, 1))]
     )
-    slabs = make_slabs(cross_columns(stack, 4), 4, 2, True, 0.0)
+    slabs = make_slabs(found := cross_columns(stack, 4), 4, 2, True, np.zeros(len(found.height)))
     np.testing.assert_allclose(slabs.low[:, 1, 2], [0.1, 0.8])
     np.testing.assert_allclose(slabs.high[:, 1, 2], [0.6, 0.9])
     assert slabs.closed == pytest.approx(0.05 / 0.6)

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 from farfield_core.errors import AlreadyExistsError
 from farfield_core.layout import near_key
+from farfield_core.object_file import ObjectFile
 from farfield_core.scene import Batch, PreparedScene
+from farfield_core.validation import parse
 from numpy.typing import NDArray
 
 from farfield_worker.near.glb import ARRAY_BUFFER, GlbWriter
@@ -35,6 +37,7 @@ class NearBlocks:
         self._put = put
         self._names: dict[int, str] = {}
         self._images: dict[int, str] = {}
+        self._shapes: set[str] = set()
         self._step = common_step(scene.info)
 
     def blob(self, block: int) -> str:
@@ -45,6 +48,20 @@ class NearBlocks:
             self._store(name, data)
             self._names[block] = name
         return self._names[block]
+
+    def _shape(self, number: int) -> str:
+        """Name of the file of an object that repeats; it and its picture are in the store."""
+        assert self._scene.repeats is not None
+        name = self._scene.repeats.shapes[number]
+        if name not in self._shapes:
+            folder = self._scene.folder / "objects"
+            data = (folder / name).read_bytes()
+            file = parse(ObjectFile, data, f"The object {name}")
+            image = file.image
+            self._store(image, (folder / image).read_bytes())
+            self._store(name, data)
+            self._shapes.add(name)
+        return name
 
     def _store(self, name: str, data: bytes) -> None:
         with suppress(AlreadyExistsError):
@@ -88,6 +105,11 @@ class NearBlocks:
             }
             for n, accessor in enumerate(glb.add_range(triangles.reshape(-1), cuts))
         ]
+        objects, owners = self._objects(first, first + block.triangles)
+        if objects:
+            parts = [(part.first_triangle - first, part.triangles) for part in block.parts]
+            for n, accessor in enumerate(glb.add_range(owners, parts, None)):
+                primitives[n]["extras"] = {"owners": accessor}
         origin = np.asarray(info.origin)
         node = {
             "mesh": 0,
@@ -102,7 +124,31 @@ class NearBlocks:
                 "meshes": [{"primitives": primitives}],
             }
             | self._looks(batches)
+            | ({"extras": {"objects": objects}} if objects else {})
         )
+
+    def _objects(self, first: int, last: int) -> tuple[dict[str, Any], NDArray[np.uint16]]:
+        """Copies of objects that repeat among some triangles, by column; who owns each triangle.
+
+        An owner is 1 + the number of a copy in the columns, or 0.
+        """
+        repeats, owners = self._scene.repeats, self._scene.owners
+        if repeats is None or owners is None:
+            return {}, np.zeros(0, np.uint16)
+        shape = np.array([*repeats.shape, -1])
+        whose = np.asarray(owners[first:last]).reshape(-1)
+        whose = np.where(shape[whose] >= 0, whose, -1)
+        here = np.unique(whose[whose >= 0])
+        names = [self._shape(int(shape[copy])) for copy in here]
+        shapes = list(dict.fromkeys(names))
+        columns = {
+            "shapes": shapes,
+            "shape": [shapes.index(name) for name in names],
+            "places": [x for copy in here for x in repeats.places[copy]],
+            "turns": [x for copy in here for x in repeats.turns[copy]],
+        }
+        numbers = np.searchsorted(here, whose) + 1
+        return (columns if shapes else {}), np.where(whose >= 0, numbers, 0).astype(np.uint16)
 
     def _looks(self, batches: list[Batch]) -> dict[str, Any]:
         """Materials, textures, samplers, images and extensions of a block."""

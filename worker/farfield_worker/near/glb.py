@@ -25,14 +25,15 @@ class GlbWriter:
     def add(
         self,
         array: NDArray[Any],
-        target: int,
+        target: int | None,
         *,
         normalized: bool = False,
         bounds: bool = False,
     ) -> int:
         """Append (n, k) data as a buffer view with one accessor; returns the accessor.
 
-        Rows of vertex data are padded to a multiple of four bytes, as the specification demands.
+        Without a `target` it is data of our own. Rows of vertex data are padded to a multiple of
+        four bytes, as the specification demands.
         """
         rows = np.ascontiguousarray(array).reshape(len(array), -1)
         row = rows.dtype.itemsize * rows.shape[1]
@@ -45,7 +46,9 @@ class GlbWriter:
             view["byteStride"] = stride
         else:
             data = rows.tobytes()
-        view |= {"byteLength": len(data), "target": target}
+        view["byteLength"] = len(data)
+        if target is not None:
+            view["target"] = target
         self._body += data + bytes(-len(data) % 4)
         accessor: dict[str, Any] = {
             "bufferView": len(self._views),
@@ -69,9 +72,14 @@ class GlbWriter:
         self._body += data + bytes(-len(data) % 4)
         return len(self._views) - 1
 
-    def add_range(self, array: NDArray[Any], cuts: list[tuple[int, int]]) -> list[int]:
-        """Append one index buffer; returns an accessor for each (first, count) in `cuts`."""
-        whole = self.add(array.reshape(-1, 1), ELEMENT_ARRAY_BUFFER)
+    def add_range(
+        self,
+        array: NDArray[Any],
+        cuts: list[tuple[int, int]],
+        target: int | None = ELEMENT_ARRAY_BUFFER,
+    ) -> list[int]:
+        """Append one list of numbers; returns an accessor for each (first, count) in `cuts`."""
+        whole = self.add(array.reshape(-1, 1), target)
         base = self._accessors.pop()
         for first, count in cuts:
             start = first * array.dtype.itemsize

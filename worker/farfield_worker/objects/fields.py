@@ -10,11 +10,15 @@ from farfield_shading import to_srgb
 from numpy.typing import NDArray
 
 from farfield_worker.objects.columns import Crossings, cross_columns
-from farfield_worker.objects.mesh import Floats, ObjectMesh, surface_at
+from farfield_worker.objects.mesh import Floats, ObjectMesh, opaque_at, surface_at
 from farfield_worker.objects.slabs import Slabs, is_closed, make_slabs
 
 #: axis of the columns -> the axes of texture x, texture y and height
 AXES = ((1, 2, 0), (2, 0, 1), (0, 1, 2))
+
+
+#: a sheet that rises more than this many texels within one is cut off
+STEEPEST = 6.0
 
 
 class Fields(NamedTuple):
@@ -55,7 +59,8 @@ def bake_fields(mesh: ObjectMesh, resolution: int, textures: int) -> Fields:
     for axes in AXES:
         thickness = float(extent[list(axes[:2])].max()) / resolution / float(extent[axes[2]])
         crossings = _opaque(mesh, cross_columns(np.ascontiguousarray(unit[..., axes]), resolution))
-        slabs = make_slabs(crossings, resolution, 2 * textures, closed, thickness)
+        half = thickness / 2 + _rise(unit[..., axes], resolution)[crossings.triangle]
+        slabs = make_slabs(crossings, resolution, 2 * textures, closed, half)
         # Sheets seen edge on are crossed by few columns, gaps that were filled show as solid.
         missed = _edge_on(mesh, axes[2]) if not closed else 0.0
         loss = slabs.closed + missed
@@ -68,9 +73,9 @@ def bake_fields(mesh: ObjectMesh, resolution: int, textures: int) -> Fields:
 
 def _opaque(mesh: ObjectMesh, crossings: Crossings) -> Crossings:
     """The crossings without those at which an alpha-masked surface has a hole."""
-    if not any(batch.alpha == "mask" for batch in mesh.scene.info.batches):
+    keep = opaque_at(mesh, crossings.triangle, crossings.weights)
+    if keep.all():
         return crossings
-    keep = surface_at(mesh, crossings.triangle, crossings.weights).opaque
     counts = np.concatenate([[0], np.cumsum(keep)])
     return Crossings(
         counts[crossings.starts],
@@ -79,6 +84,14 @@ def _opaque(mesh: ObjectMesh, crossings: Crossings) -> Crossings:
         crossings.triangle[keep],
         crossings.weights[keep],
     )
+
+
+def _rise(corners: Floats, resolution: int) -> Floats:
+    """Half of what each triangle of (m, 3, 3) rises within a texel, at most some texels, (m,)."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    across = np.abs(normal[:, 0]) + np.abs(normal[:, 1])
+    slope = across / np.maximum(np.abs(normal[:, 2]), 1e-9 * np.maximum(across, 1e-300))
+    return np.asarray(np.minimum(slope, STEEPEST) / (2 * resolution))
 
 
 def _edge_on(mesh: ObjectMesh, axis: int) -> float:

@@ -17,13 +17,15 @@ class ObjectMesh(NamedTuple):
     """A prepared scene taken as one object.
 
     Attributes:
-        corners: (m, 3, 3) float64, metres, scene coordinates.
+        corners: (m, 3, 3) float64, metres.
+        vertices: (m, 3) int64, the scene's vertices.
         welded: (m, 3) int64, corners numbered by place.
         batch: (m,) int64.
         scene: where normals, colours and textures come from.
     """
 
     corners: Floats
+    vertices: NDArray[np.int64]
     welded: NDArray[np.int64]
     batch: NDArray[np.int64]
     scene: PreparedScene
@@ -37,22 +39,45 @@ class Surface(NamedTuple):
     opaque: NDArray[np.bool_]
 
 
-def read_mesh(scene: PreparedScene) -> ObjectMesh:
-    """Take all of a prepared scene as one object."""
-    positions = scene.positions.astype(np.float64) + scene.origin
-    _, places = np.unique(scene.positions, axis=0, return_inverse=True)
-    batch = np.zeros(len(scene.triangles), np.int64)
-    for block in scene.info.blocks:
-        for part in block.parts:
-            batch[part.first_triangle : part.first_triangle + part.triangles] = part.batch
-    triangles = np.asarray(scene.triangles, np.int64)
-    return ObjectMesh(positions[triangles], places.reshape(-1)[triangles], batch, scene)
+def read_mesh(
+    scene: PreparedScene, rows: NDArray[np.int64] | None = None, origin: Floats | None = None
+) -> ObjectMesh:
+    """Take a prepared scene, or its triangles `rows` (m,), as one object.
+
+    Its coordinates are relative to `origin` (3,), scene coordinates.
+    """
+    shift = scene.origin if origin is None else scene.origin - origin
+    if rows is None:
+        rows = np.arange(len(scene.triangles))
+    triangles = np.asarray(scene.triangles[rows], np.int64)
+    parts = [part for block in scene.info.blocks for part in block.parts]
+    starts = np.array([part.first_triangle for part in parts], np.int64)
+    of_part = np.array([part.batch for part in parts], np.int64)
+    points = scene.positions[triangles]
+    _, places = np.unique(points.reshape(-1, 3), axis=0, return_inverse=True)
+    return ObjectMesh(
+        points.astype(np.float64) + shift,
+        triangles,
+        places.reshape(-1, 3),
+        of_part[np.searchsorted(starts, rows, side="right") - 1],
+        scene,
+    )
+
+
+def opaque_at(mesh: ObjectMesh, triangle: NDArray[np.int64], weights: Floats) -> NDArray[np.bool_]:
+    """Where points of triangles are no holes of a mask, (n,); arguments as in `surface_at`."""
+    masked = [n for n, batch in enumerate(mesh.scene.info.batches) if batch.alpha == "mask"]
+    rows = np.flatnonzero(np.isin(mesh.batch[triangle], masked))
+    out = np.ones(len(triangle), np.bool_)
+    if len(rows):
+        out[rows] = surface_at(mesh, triangle[rows], weights[rows]).opaque
+    return out
 
 
 def surface_at(mesh: ObjectMesh, triangle: NDArray[np.int64], weights: Floats) -> Surface:
     """The surface at points of triangles: `triangle` (n,), `weights` (n, 3) barycentric."""
     scene = mesh.scene
-    vertices = np.asarray(scene.triangles, np.int64)[triangle]
+    vertices = mesh.vertices[triangle]
     normal = np.einsum("nc,nck->nk", weights, scene.normals[vertices][..., :3] / 127.0)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     edges = mesh.corners[triangle]

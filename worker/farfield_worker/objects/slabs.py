@@ -2,7 +2,8 @@
 
 Two slabs fill the four channels of one texture (Risser, section 21.2.1). A closed mesh is inside
 where more surfaces have been entered than left, so overlapping parts become one. A mesh that is not
-closed has no inside: each of its sheets becomes a slab of one texel's thickness. A column with more
+closed has no inside: each of its sheets becomes a slab as thick as a texel and as the sheet rises
+within its column, so that steep sheets have no holes between columns. A column with more
 slabs than there are textures for has its narrowest gaps closed.
 """
 
@@ -44,9 +45,9 @@ def is_closed(triangles: NDArray[np.int64]) -> bool:
 
 
 def make_slabs(
-    crossings: Crossings, resolution: int, count: int, closed: bool, thickness: float
+    crossings: Crossings, resolution: int, count: int, closed: bool, half: Floats
 ) -> Slabs:
-    """At most `count` slabs a column; open sheets become `thickness` thick, in [0, 1]."""
+    """At most `count` slabs a column; open sheets reach `half` (crossings,) to both sides."""
     low = np.full((count, resolution**2), 1.0)
     high = np.zeros((count, resolution**2))
     surface = np.full((count, 2, resolution**2), -1, np.int64)
@@ -56,7 +57,7 @@ def make_slabs(
         crossings.height,
         crossings.enters,
         closed,
-        thickness,
+        half,
         np.empty((most, 2)),
         np.empty((most, 2), np.int64),
         low,
@@ -73,7 +74,7 @@ def make_slabs(
 
 
 @njit(cache=True)
-def _collect(starts, height, enters, closed, thickness, spans, sides, low, high, surface):  # type: ignore[no-untyped-def]
+def _collect(starts, height, enters, closed, half, spans, sides, low, high, surface):  # type: ignore[no-untyped-def]
     filled = 0.0
     solid = 0.0
     for column in range(len(starts) - 1):
@@ -88,23 +89,17 @@ def _collect(starts, height, enters, closed, thickness, spans, sides, low, high,
                     spans[n, 1], sides[n, 1] = height[i], i
                     n += 1
                 continue
-            bottom, top = height[i] - thickness / 2, height[i] + thickness / 2
-            if n > 0 and bottom <= spans[n - 1, 1]:
-                spans[n - 1, 1], sides[n - 1, 1] = top, i
-            else:
-                spans[n, 0], spans[n, 1] = bottom, top
-                sides[n, 0], sides[n, 1] = i, i
-                n += 1
+            spans[n, 0], spans[n, 1] = height[i] - half[i], height[i] + half[i]
+            sides[n, 0], sides[n, 1] = i, i
+            while n > 0 and spans[n, 0] <= spans[n - 1, 1]:
+                if spans[n, 0] < spans[n - 1, 0]:
+                    spans[n - 1, 0], sides[n - 1, 0] = spans[n, 0], sides[n, 0]
+                if spans[n, 1] > spans[n - 1, 1]:
+                    spans[n - 1, 1], sides[n - 1, 1] = spans[n, 1], sides[n, 1]
+                n -= 1
+            n += 1
         while n > low.shape[0]:
-            best = 1
-            for k in range(2, n):
-                if spans[k, 0] - spans[k - 1, 1] < spans[best, 0] - spans[best - 1, 1]:
-                    best = k
-            filled += spans[best, 0] - spans[best - 1, 1]
-            spans[best - 1, 1], sides[best - 1, 1] = spans[best, 1], sides[best, 1]
-            for k in range(best, n - 1):
-                spans[k, 0], spans[k, 1] = spans[k + 1, 0], spans[k + 1, 1]
-                sides[k, 0], sides[k, 1] = sides[k + 1, 0], sides[k + 1, 1]
+            filled += _fill_narrowest(spans, sides, n)
             n -= 1
         for k in range(n):
             low[k, column] = max(0.0, spans[k, 0])
@@ -112,3 +107,18 @@ def _collect(starts, height, enters, closed, thickness, spans, sides, low, high,
             surface[k, 0, column], surface[k, 1, column] = sides[k, 0], sides[k, 1]
             solid += high[k, column] - low[k, column]
     return filled, solid
+
+
+@njit(cache=True)
+def _fill_narrowest(spans, sides, n):  # type: ignore[no-untyped-def]
+    """Close the narrowest gap between `n` slabs; returns how wide it was."""
+    best = 1
+    for k in range(2, n):
+        if spans[k, 0] - spans[k - 1, 1] < spans[best, 0] - spans[best - 1, 1]:
+            best = k
+    width = spans[best, 0] - spans[best - 1, 1]
+    spans[best - 1, 1], sides[best - 1, 1] = spans[best, 1], sides[best, 1]
+    for k in range(best, n - 1):
+        spans[k, 0], spans[k, 1] = spans[k + 1, 0], spans[k + 1, 1]
+        sides[k, 0], sides[k, 1] = sides[k + 1, 0], sides[k + 1, 1]
+    return width

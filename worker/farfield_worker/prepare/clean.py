@@ -56,4 +56,6 @@ def _flatten(model: Model) -> None:
         )
         model.placed[row] = len(model.meshes)
         model.matrices[row] = np.eye(4)
+        if model.copies is not None:
+            model.copies[row] = -1
         model.meshes.append(flat)

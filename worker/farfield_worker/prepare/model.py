@@ -86,6 +86,8 @@ class Model:
         placed: (k,) int32, the mesh of each instance.
         matrices: (k, 4, 4) float64, mesh space to scene space, column vectors.
         notes: what was left out or guessed, a sentence each.
+        shapes, copies: (k,) int32 each, or None: of which object each instance is a part, and of
+            which of its copies; instances of one copy stand under one matrix. -1: of none.
     """
 
     meshes: list[Mesh]
@@ -93,6 +95,8 @@ class Model:
     placed: NDArray[np.int32]
     matrices: NDArray[np.float64]
     notes: list[str] = field(default_factory=list)
+    shapes: NDArray[np.int32] | None = None
+    copies: NDArray[np.int32] | None = None
 
 
 def one_of_each(meshes: list[Mesh], materials: list[Material], notes: list[str]) -> Model:

@@ -12,6 +12,7 @@ import numpy as np
 from farfield_core.scene import Batch, Block, Bounds, Part, SceneInfo, Triple, map_scene
 from numpy.typing import NDArray
 
+from farfield_worker.objects.shapes import bake_shapes
 from farfield_worker.prepare.arrays import GrowingArray
 from farfield_worker.prepare.assembly import Assembly, assemble
 from farfield_worker.prepare.batches import TextureFiles, sort_into_batches
@@ -21,6 +22,7 @@ from farfield_worker.prepare.limits import Limits, refuse
 from farfield_worker.prepare.orientation import guess_orientation, upright_matrix
 from farfield_worker.prepare.pictures import draw_pictures
 from farfield_worker.prepare.read import read_model
+from farfield_worker.prepare.repeats import Copies, find_copies
 from farfield_worker.prepare.split import split
 from farfield_worker.prepare.weld import Welded, weld
 
@@ -42,12 +44,14 @@ def prepare(
     pictures: bool = True,
     up: Literal["y", "z"] = "y",
     scale: float = 1.0,
+    repeats: bool = True,
 ) -> SceneInfo:
     """Prepare the model at `source` into the folder `out`, replacing what is there.
 
     `up` is the axis of the model's own coordinates that points up, `scale` the metres in one of
     their units.
 
+    With `repeats` objects of which there are many copies are baked as true impostors.
     Nothing is visible under `out` before everything is. With `pictures` it draws the map and the
     thumbnail, which creates a GL context in this process. Raises SceneRefusedError for files that
     cannot be read, whatever is wrong with them.
@@ -58,7 +62,7 @@ def prepare(
     try:
         work.chmod(0o755)
         upright = upright_matrix(up, scale)
-        info = _prepare(source, work, scene_id, name, limits, progress, pictures, upright)
+        info = _prepare(source, work, scene_id, name, limits, progress, pictures, upright, repeats)
         if out.exists():
             shutil.rmtree(out)
         work.rename(out)
@@ -78,8 +82,9 @@ def _prepare(
     progress: Progress,
     pictures: bool,
     upright: NDArray[np.float64],
+    repeats: bool,
 ) -> SceneInfo:
-    info = _convert(source, work, scene_id, name, limits, progress, upright)
+    info = _convert(source, work, scene_id, name, limits, progress, upright, repeats)
     if pictures:
         progress("drawing the map")
         view = draw_pictures(map_scene(work, info), work)
@@ -99,6 +104,7 @@ def _convert(
     limits: Limits,
     progress: Progress,
     upright: NDArray[np.float64],
+    repeats: bool,
 ) -> SceneInfo:
     """Write everything but the pictures and scene.json."""
     progress("reading")
@@ -126,8 +132,9 @@ def _convert(
     points = centroids(assembly, origin)
     order, starts = split(points)
     progress(f"writing {len(starts) - 1} blocks")
-    blocks, vertices = _write(work, assembly, origin, batches, points, order, starts)
-    return SceneInfo(
+    copies = find_copies(model, assembly, batches) if repeats else None
+    blocks, vertices = _write(work, assembly, origin, batches, points, order, starts, copies)
+    info = SceneInfo(
         id=scene_id,
         name=name,
         bounds=Bounds(min=_triple(low), max=_triple(high)),
@@ -140,6 +147,10 @@ def _convert(
         notes=tuple(model.notes),
         suspected=suspected,
     )
+    if copies is not None:
+        progress(f"baking {len(copies.first)} objects that repeat")
+        bake_shapes(map_scene(work, info), copies)
+    return info
 
 
 def _write(
@@ -150,6 +161,7 @@ def _write(
     points: NDArray[np.float32],
     order: NDArray[np.uint32],
     starts: NDArray[np.int64],
+    copies: Copies | None,
 ) -> tuple[list[Block], int]:
     files = {
         "positions": GrowingArray(work / "positions.npy", np.float32, 3),
@@ -158,6 +170,8 @@ def _write(
         "colors": GrowingArray(work / "colors.npy", np.uint16, 4),
         "triangles": GrowingArray(work / "triangles.npy", np.uint32, 3),
     }
+    if copies is not None:
+        files["owners"] = GrowingArray(work / "owners.npy", np.int32, 1)
     double_sided = np.array([batch.double_sided for batch in batches], np.bool_)
     blocks: list[Block] = []
     vertices = 0
@@ -168,7 +182,11 @@ def _write(
         blocks += _describe(welded, chunk, vertices)
         welded.triangles[...] += np.uint32(vertices)
         for name, file in files.items():
-            file.append(getattr(welded, name))
+            if name == "owners":
+                assert copies is not None
+                file.append(copies.owner[welded.instance][:, None])
+            else:
+                file.append(getattr(welded, name))
         vertices += len(welded.positions)
     for file in files.values():
         file.close()

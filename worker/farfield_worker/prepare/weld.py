@@ -24,6 +24,7 @@ class Welded:
         triangles: (t, 3) uint32, indices from the first vertex of these blocks.
         batch: (t,) int32.
         vertex_starts: (b + 1,) int64, first vertex of each block.
+        instance: (t,) int32, of which instance each triangle is.
     """
 
     positions: NDArray[np.float32]
@@ -33,6 +34,7 @@ class Welded:
     triangles: NDArray[np.uint32]
     batch: NDArray[np.int32]
     vertex_starts: NDArray[np.int64]
+    instance: NDArray[np.int32]
 
 
 def weld(
@@ -76,6 +78,7 @@ def weld(
         triangles,
         a.batch[instance],
         vertex_starts,
+        instance,
     )
 
 

@@ -19,12 +19,12 @@ from jsonschema import Draft202012Validator
 from farfield_core.errors import BadInputError
 from farfield_core.walk import CellFile, Walk
 
-Kind = Literal["walk", "cell", "page"]
+Kind = Literal["walk", "cell", "page", "object"]
 
 
 @cache
 def schema(kind: Kind) -> dict[str, Any]:
-    """The JSON Schema of walk.json, of a cell's file, or of a page of a large cell table."""
+    """The JSON Schema of walk.json, a cell's file, a page of a large cell table, or an object."""
     if kind == "page":
         walk = schema("walk")
         return {"$schema": walk["$schema"], "$ref": "#/$defs/cells", "$defs": walk["$defs"]}

@@ -1,16 +1,18 @@
 /** A walk with animated objects placed in it. */
 
-import { Walk } from '@farfield/three';
+import { Walk, type NearImpostors } from '@farfield/three';
 import { AnimationMixer, DirectionalLight, HemisphereLight, type Object3D } from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { createMill } from './mill.js';
 import type { Show, Stand } from './stand.js';
 
+const WAYS: readonly NearImpostors[] = ['auto', 'always', 'copies', 'never'];
+
 export async function showWalk(stand: Stand, query: URLSearchParams): Promise<Show> {
-  const near = query.get('near');
+  const near = WAYS.find((way) => way === query.get('near')) ?? 'never';
   const walk = new Walk(query.get('walk') ?? '', {
     renderer: stand.renderer,
-    nearImpostors: near === 'always' || near === 'auto' ? near : 'never',
+    nearImpostors: near,
   });
   stand.scene.add(walk.group, new HemisphereLight(0xffffff, 0x888888, 2));
   const sun = new DirectionalLight(0xffffff, 2);

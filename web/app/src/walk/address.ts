@@ -1,6 +1,7 @@
 /** What the page's address says: which walk, where to stand, how to behave. */
 
 import type { Vec3 } from '@farfield/core';
+import type { NearImpostors } from '@farfield/three';
 
 export interface Pose {
   readonly eye: Vec3;
@@ -48,6 +49,14 @@ export function textureMemory(page: URL): number | undefined {
 export function fadeSeconds(page: URL): number {
   const asked = Number(page.searchParams.get('fade') ?? NaN);
   return asked > 0 && asked <= 5 ? asked : 0;
+}
+
+const WAYS: readonly NearImpostors[] = ['auto', 'always', 'copies', 'never'];
+
+/** `?near=auto|always|copies|never`: how costly objects of the near field are drawn. */
+export function nearImpostors(page: URL): NearImpostors {
+  const asked = page.searchParams.get('near');
+  return WAYS.find((way) => way === asked) ?? 'never';
 }
 
 /** `?path=URL`: a recorded path to play. */

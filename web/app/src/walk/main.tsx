@@ -3,7 +3,14 @@
 import { FarfieldError, asError } from '@farfield/core';
 import { render } from 'preact';
 import '../styles.css';
-import { fadeSeconds, isCapture, manifestUrl, pathUrl, textureMemory } from './address.js';
+import {
+  fadeSeconds,
+  isCapture,
+  manifestUrl,
+  nearImpostors,
+  pathUrl,
+  textureMemory,
+} from './address.js';
 import { createHooks, type Hooks } from './capture.js';
 import { parsePath, type PathFile } from './path.js';
 import { Session } from './session.js';
@@ -58,6 +65,7 @@ function open(ui: HTMLElement, canvas: HTMLCanvasElement): void {
     manifestUrl: url,
     capture,
     fade: fadeSeconds(page),
+    near: nearImpostors(page),
     textureBytes: (textureMemory(page) ?? textureMegabytes()) * 2 ** 20,
   });
   window.farfield = createHooks(session);

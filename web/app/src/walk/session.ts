@@ -1,7 +1,7 @@
 /** One visit to a walk: renderer, camera, walker and the frame loop. */
 
 import { FetchQueue, ZipSource, cellDistance, type Vec3 } from '@farfield/core';
-import { Walk, setInfiniteFar } from '@farfield/three';
+import { Walk, setInfiniteFar, type NearImpostors } from '@farfield/three';
 import { Overlays } from '@farfield/three/overlays';
 import { Group, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
 import { Comparison } from './comparison.js';
@@ -22,6 +22,8 @@ export interface SessionOptions {
   readonly textureBytes: number;
   /** Seconds in which one cell fades into the next. */
   readonly fade: number;
+  /** How costly objects of the near field are drawn. */
+  readonly near: NearImpostors;
 }
 
 /** A walk in a zip is read out of it. */
@@ -77,6 +79,7 @@ export class Session {
       backgroundAlpha: capture ? 0 : 1,
       textureBytes: options.textureBytes,
       fade: options.fade,
+      nearImpostors: options.near,
     });
     this.scene.add(this.walk.group);
     this.walk.setCamera(this.camera);

@@ -4,6 +4,7 @@ import { FarfieldError, asError, AbortedError } from './errors.js';
 import type { CellFile, NearReference, Vec3 } from './format.js';
 import { WALK_VERSION } from './format.js';
 import { buildNearBatches, type NearBatch, type NearSource } from './near.js';
+import { CopyList, type Copy } from './objects/copies.js';
 import {
   findObjects,
   type FindOptions,
@@ -28,6 +29,8 @@ export interface BuiltCell {
 export interface BuiltNear {
   readonly batches: NearBatch[];
   readonly solid: SolidData;
+  /** What the batches' owners are numbers of. */
+  readonly copies: readonly Copy[];
 }
 
 export interface CellBuilder {
@@ -63,8 +66,9 @@ export function buildCell(bytes: ArrayBuffer, resolution: number): BuiltCell {
 }
 
 function buildNear(sources: readonly NearSource[], centre: Vec3, size: Vec3): BuiltNear {
-  const batches = buildNearBatches(sources, centre);
-  return { batches, solid: buildSolid(batches, centre, size) };
+  const list = new CopyList();
+  const batches = buildNearBatches(sources, centre, list);
+  return { batches, solid: buildSolid(batches, centre, size), copies: list.copies };
 }
 
 /** Builds on the calling thread. */
@@ -171,12 +175,13 @@ export function answer(request: BuildRequest): { reply: BuildReply; transfer: Ar
     }
     const value = buildNear(request.sources, request.centre, request.size);
     const { corners, starts, items } = value.solid;
-    const transfer = value.batches.flatMap(({ positions, normals, uvs, colors, indices }) => [
-      positions.buffer,
-      normals.buffer,
-      uvs.buffer,
-      colors.buffer,
-      indices.buffer,
+    const transfer = value.batches.flatMap((batch) => [
+      batch.positions.buffer,
+      batch.normals.buffer,
+      batch.uvs.buffer,
+      batch.colors.buffer,
+      batch.indices.buffer,
+      batch.owners.buffer,
     ]);
     transfer.push(corners.buffer, starts.buffer, items.buffer);
     return { reply: { id: request.id, value }, transfer };

@@ -40,6 +40,8 @@ export interface GltfPrimitive {
   readonly indices?: number;
   readonly material?: number;
   readonly mode?: number;
+  /** `owners`: an accessor with a number for each triangle, see docs/format.md. */
+  readonly extras?: { readonly owners?: number };
 }
 
 export interface Gltf {
@@ -57,6 +59,14 @@ export interface Gltf {
     readonly byteLength: number;
     readonly byteStride?: number;
   }[];
+  readonly extras?: {
+    readonly objects?: {
+      readonly shapes?: readonly string[];
+      readonly shape?: readonly number[];
+      readonly places?: readonly number[];
+      readonly turns?: readonly number[];
+    };
+  };
   readonly extensionsRequired?: readonly string[];
   readonly images?: readonly { readonly uri?: string }[];
   readonly materials?: readonly GltfMaterial[];

@@ -8,6 +8,7 @@
 
 import { FarfieldError } from './errors.js';
 import type { Vec3 } from './format.js';
+import { CopyList } from './objects/copies.js';
 import { parseGlb, readAccessor, type AccessorView, type Glb } from './glb.js';
 import { readMaterial, stateKey, type NearMaterial, type NearState } from './near-material.js';
 
@@ -26,6 +27,8 @@ export interface NearBatch {
   /** 4 per vertex, linear base colour and opacity times 65535. */
   readonly colors: Uint16Array<ArrayBuffer>;
   readonly indices: Uint32Array<ArrayBuffer>;
+  /** Number of the copy that each triangle is part of, -1 for none; empty where there are no copies. */
+  readonly owners: Int32Array<ArrayBuffer>;
 }
 
 /** A near block's bytes and the triangles wanted of it, as in a cell file. */
@@ -41,6 +44,8 @@ interface Piece {
   readonly vertices: Uint32Array;
   /** Corners, as numbers of new vertices. */
   readonly corners: Uint32Array;
+  /** Number of each triangle's copy, -1 for none. */
+  readonly owners: Int32Array;
 }
 
 interface Primitive {
@@ -49,33 +54,41 @@ interface Primitive {
   readonly uv: AccessorView | undefined;
   readonly color: AccessorView | undefined;
   readonly indices: AccessorView | undefined;
+  readonly owners: AccessorView | undefined;
   readonly translation: Vec3;
   readonly scale: Vec3;
 }
 
 /**
  * Merge the listed triangles of `sources`, relative to `centre`; batches, and triangles in them, in
- * the order in which they are best drawn. Throws FarfieldError 'format'.
+ * the order in which they are best drawn. Copies of objects among them are added to `list`. Throws
+ * FarfieldError 'format'.
  */
-export function buildNearBatches(sources: readonly NearSource[], centre: Vec3): NearBatch[] {
+export function buildNearBatches(
+  sources: readonly NearSource[],
+  centre: Vec3,
+  list = new CopyList(),
+): NearBatch[] {
   const groups = new Map<string, Piece[]>();
   for (const { bytes, ranges } of sources) {
     const glb = parseGlb(bytes);
+    const copies = list.add(glb);
     const perPrimitive = new Map<number, [number, number][]>();
     for (let n = 0; n + 2 < ranges.length; n += 3) {
-      const list = perPrimitive.get(ranges[n]) ?? [];
-      list.push([ranges[n + 1], ranges[n + 2]]);
-      perPrimitive.set(ranges[n], list);
+      const wanted = perPrimitive.get(ranges[n]) ?? [];
+      wanted.push([ranges[n + 1], ranges[n + 2]]);
+      perPrimitive.set(ranges[n], wanted);
     }
-    for (const [number, list] of perPrimitive) {
+    for (const [number, wanted] of perPrimitive) {
       const { primitive, material } = readPrimitive(glb, number);
       const key = stateKey(material.state);
       const pieces = groups.get(key) ?? [];
-      pieces.push({ primitive, material, ...collect(primitive, list) });
+      pieces.push({ primitive, material, ...collect(primitive, wanted, copies) });
       groups.set(key, pieces);
     }
   }
-  const batches = [...groups.values()].map((pieces) => merge(pieces, centre));
+  const owned = list.copies.length > 0;
+  const batches = [...groups.values()].map((pieces) => merge(pieces, centre, owned));
   return batches.sort((a, b) => middle(a) - middle(b));
 }
 
@@ -101,6 +114,7 @@ function readPrimitive(glb: Glb, number: number): { primitive: Primitive; materi
       uv: read(source.attributes.TEXCOORD_0),
       color: read(source.attributes.COLOR_0),
       indices: read(source.indices),
+      owners: read(source.extras?.owners),
       translation: [tx, ty, tz],
       scale: [sx, sy, sz],
     },
@@ -109,12 +123,14 @@ function readPrimitive(glb: Glb, number: number): { primitive: Primitive; materi
 
 /** The vertices that some ranges of triangles use, each once, and the triangles over them. */
 function collect(
-  { position, indices }: Primitive,
+  { position, indices, owners }: Primitive,
   ranges: readonly [number, number][],
-): Pick<Piece, 'vertices' | 'corners'> {
+  copies: readonly number[],
+): Pick<Piece, 'vertices' | 'corners' | 'owners'> {
   const total = ranges.reduce((sum, [, triangles]) => sum + triangles, 0);
   const available = (indices?.count ?? position.count) / 3;
   const corners = new Uint32Array(3 * total);
+  const whose = new Int32Array(total).fill(-1);
   const renumbered = new Int32Array(position.count).fill(-1);
   const vertices: number[] = [];
   let at = 0;
@@ -124,6 +140,13 @@ function collect(
         'format',
         'A cell lists triangles that its near block does not have.',
       );
+    }
+    for (let n = first; owners !== undefined && n < first + triangles; n++) {
+      const owner = n < owners.count ? owners.data[n * owners.stride] : Infinity;
+      if (owner > copies.length) {
+        throw new FarfieldError('format', 'A triangle of a near block is part of no copy.');
+      }
+      if (owner > 0) whose[at / 3 + n - first] = copies[owner - 1];
     }
     for (let n = 3 * first; n < 3 * (first + triangles); n++) {
       const vertex = indices === undefined ? n : indices.data[n * indices.stride];
@@ -137,10 +160,10 @@ function collect(
       corners[at++] = renumbered[vertex];
     }
   }
-  return { vertices: Uint32Array.from(vertices), corners };
+  return { vertices: Uint32Array.from(vertices), corners, owners: whose };
 }
 
-function merge(pieces: readonly Piece[], centre: Vec3): NearBatch {
+function merge(pieces: readonly Piece[], centre: Vec3, owned: boolean): NearBatch {
   const { state } = pieces[0].material;
   const textured = state.map !== undefined || state.emissiveMap !== undefined;
   const count = pieces.reduce((sum, piece) => sum + piece.vertices.length, 0);
@@ -152,6 +175,7 @@ function merge(pieces: readonly Piece[], centre: Vec3): NearBatch {
     uvs: new Float32Array(textured ? 2 * count : 0),
     colors: new Uint16Array(4 * count),
     indices: new Uint32Array(corners),
+    owners: new Int32Array(owned ? corners / 3 : 0),
   };
   let firstVertex = 0;
   let firstCorner = 0;
@@ -160,6 +184,7 @@ function merge(pieces: readonly Piece[], centre: Vec3): NearBatch {
     for (let n = 0; n < piece.corners.length; n++) {
       batch.indices[firstCorner + n] = firstVertex + piece.corners[n];
     }
+    if (owned) batch.owners.set(piece.owners, firstCorner / 3);
     firstVertex += piece.vertices.length;
     firstCorner += piece.corners.length;
   }
@@ -172,7 +197,7 @@ function merge(pieces: readonly Piece[], centre: Vec3): NearBatch {
  * cell this is nearly front to back, so most hidden pixels are never shaded: near polygons cost
  * their pixels, not their number (measured: 30 % less time where they fill the picture).
  */
-function sortByDistance({ positions, indices }: NearBatch): void {
+function sortByDistance({ positions, indices, owners }: NearBatch): void {
   const count = indices.length / 3;
   const distances = new Float32Array(count);
   for (let t = 0; t < count; t++) {
@@ -193,6 +218,7 @@ function sortByDistance({ positions, indices }: NearBatch): void {
     sorted.set(indices.subarray(3 * order[n], 3 * order[n] + 3), 3 * n);
   }
   indices.set(sorted);
+  if (owners.length > 0) owners.set(Int32Array.from(order, (t) => owners[t]));
 }
 
 /** Squared distance of the triangle in the middle of a sorted batch. */

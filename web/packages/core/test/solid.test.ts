@@ -24,6 +24,7 @@ function batch(triangles: readonly Triangle[], alpha: 'opaque' | 'mask' = 'opaqu
     uvs: new Float32Array(),
     colors: new Uint16Array(),
     indices: Uint32Array.from({ length: 3 * triangles.length }, (_, n) => n),
+    owners: new Int32Array(0),
   };
 }
 

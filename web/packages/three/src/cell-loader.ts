@@ -6,6 +6,7 @@ import {
   Solid,
   type BuiltCell,
   type CellBuilder,
+  type Copy,
   type FetchQueue,
   type Job,
   type Loaded,
@@ -14,11 +15,14 @@ import {
   type NearState,
   type NearTexture,
   type User,
+  type Vec3,
 } from '@farfield/core';
 import type { RawShaderMaterial, Texture } from 'three';
 import type { AttributeUpload } from './attribute-upload.js';
 import { CellView } from './cell-view.js';
 import type { NearMaterials } from './near-materials.js';
+import { CellCopies } from './objects/cell-copies.js';
+import type { Shapes } from './objects/shapes.js';
 import type { NearTextures } from './near-textures.js';
 import type { PagePool } from './page-pool.js';
 
@@ -34,8 +38,17 @@ export interface CellLoaderParts {
   readonly materials: NearMaterials;
   readonly farMaterial: RawShaderMaterial;
   readonly attributes: AttributeUpload;
+  /** Objects that repeat; undefined where they are drawn as polygons. */
+  readonly shapes: Shapes | undefined;
   /** Make the view's shader programs ready. */
   readonly compile: (view: CellView) => Promise<void>;
+}
+
+interface Near {
+  readonly batches: NearBatch[];
+  readonly solid: Solid;
+  readonly textures: Map<NearTexture, Texture>;
+  readonly copies: CellCopies | undefined;
 }
 
 export class CellLoader {
@@ -102,7 +115,7 @@ export class CellLoader {
     const allNear = this.near(cell, job, user, held);
     await Promise.allSettled([allSlots, allNear]);
     const slots = await allSlots;
-    const { batches, solid, textures } = await allNear;
+    const { batches, solid, textures, copies } = await allNear;
     const view = new CellView(
       cell,
       slots,
@@ -117,6 +130,7 @@ export class CellLoader {
       ),
       solid,
       release,
+      copies,
     );
     try {
       await compile(view);
@@ -129,12 +143,7 @@ export class CellLoader {
     return view;
   }
 
-  private async near(
-    cell: BuiltCell,
-    job: Job,
-    user: User,
-    held: (() => void)[],
-  ): Promise<{ batches: NearBatch[]; solid: Solid; textures: Map<NearTexture, Texture> }> {
+  private async near(cell: BuiltCell, job: Job, user: User, held: (() => void)[]): Promise<Near> {
     const { builder, manifest } = this.parts;
     const sources = await settleAll(
       cell.near.map(async ({ blob, ranges }) => {
@@ -156,7 +165,41 @@ export class CellLoader {
         return [texture, loaded] as const;
       }),
     );
-    return { batches, solid: new Solid(built.solid), textures: new Map(textures) };
+    return {
+      batches,
+      solid: new Solid(built.solid),
+      textures: new Map(textures),
+      copies: await this.copies(batches, built.copies, cell.centre, job, user, held),
+    };
+  }
+
+  private async copies(
+    batches: readonly NearBatch[],
+    copies: readonly Copy[],
+    centre: Vec3,
+    job: Job,
+    user: User,
+    held: (() => void)[],
+  ): Promise<CellCopies | undefined> {
+    const { shapes, manifest, materials } = this.parts;
+    if (shapes === undefined || copies.length === 0) return undefined;
+    const names = [...new Set(copies.map(({ shape }) => shape))];
+    const loaded = await settleAll(
+      names.map(async (name) => {
+        held.push(() => shapes.release(name, user));
+        return [name, await abortable(shapes.acquire(name, user), job.signal)] as const;
+      }),
+    );
+    const { grid, near_field } = manifest.walk;
+    return new CellCopies(batches, {
+      copies,
+      shapes: new Map(
+        loaded.flatMap(([name, baked]) => (baked === undefined ? [] : [[name, baked]])),
+      ),
+      space: { centre, size: grid.size, nearField: near_field },
+      light: materials.light,
+      fade: materials.fade,
+    });
   }
 
   /** The state with its textures' addresses made absolute, so that blocks share them. */

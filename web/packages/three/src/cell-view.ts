@@ -18,7 +18,9 @@ import {
   type Camera,
   type RawShaderMaterial,
 } from 'three';
+import type { CellCopies } from './objects/cell-copies.js';
 
+/** Mesh of a cell. */
 export type WalkMesh = Mesh<BufferGeometry, RawShaderMaterial>;
 
 export class CellView {
@@ -34,6 +36,8 @@ export class CellView {
   readonly solid: Solid;
   /** Bytes of all vertex and index buffers. */
   readonly bytes: number;
+  /** Objects of the near field of which there are many. */
+  readonly copies: CellCopies | undefined;
   /** Which pixels it is drawn at, see `FADE_GLSL`. */
   fade = 0;
   private readonly sectors: Sectors;
@@ -44,6 +48,7 @@ export class CellView {
    * @param nearMaterials a material for each batch
    * @param solid the near field as obstacles
    * @param release called once, when the view is disposed of
+   * @param copies what repeats among the batches
    */
   constructor(
     cell: BuiltCell,
@@ -53,7 +58,9 @@ export class CellView {
     nearMaterials: readonly RawShaderMaterial[],
     solid: Solid,
     release: () => void,
+    copies?: CellCopies,
   ) {
+    this.copies = copies;
     this.release = release;
     this.solid = solid;
     this.sectors = cell.sectors;
@@ -72,6 +79,7 @@ export class CellView {
         this.wide = mesh(part(geometry, cell.sectors.wide), farMaterial, 1);
     }
     for (const object of [...this.near, ...this.farMeshes]) this.group.add(object);
+    if (copies !== undefined) this.group.add(...copies.meshes);
     this.nearTriangles = batches.reduce((sum, { indices }) => sum + indices.length / 3, 0);
     this.bytes = this.geometries.reduce((sum, geometry) => sum + geometryBytes(geometry), 0);
   }
@@ -99,13 +107,14 @@ export class CellView {
 
   /** What drawing the cell costs, in draw calls. */
   get drawCalls(): number {
-    return this.group.children.length;
+    return this.group.children.filter(({ visible }) => visible).length;
   }
 
   dispose(): void {
     this.group.removeFromParent();
     for (const geometry of this.geometries) geometry.dispose();
     this.wide?.geometry.dispose();
+    this.copies?.dispose();
     this.release();
   }
 }

@@ -4,8 +4,8 @@
  * post-processing in Call of Duty: Advanced Warfare", SIGGRAPH 2014).
  */
 
-import type { IUniform } from 'three';
-import type { CellView, WalkMesh } from './cell-view.js';
+import type { BufferGeometry, IUniform, Mesh, RawShaderMaterial } from 'three';
+import type { CellView } from './cell-view.js';
 
 /** `ff_fade` is 0 for all pixels, s for a share s of them, -s for those that s leaves. */
 export const FADE_GLSL = `
@@ -18,10 +18,14 @@ bool ff_faded() {
 `;
 
 /** Have a mesh drawn with its cell's fade, though its material is shared with other cells. */
-export function fadeWith(view: CellView, mesh: WalkMesh, fade: IUniform<number>): void {
+export function fadeWith(
+  view: CellView,
+  { material }: Mesh<BufferGeometry, RawShaderMaterial>,
+  fade: IUniform<number>,
+): void {
   if (fade.value === view.fade) return;
   fade.value = view.fade;
-  mesh.material.uniformsNeedUpdate = true;
+  material.uniformsNeedUpdate = true;
 }
 
 /** The cell that goes and the one that comes. */

@@ -114,6 +114,7 @@ export class NearMaterials {
   readonly top: IUniform<number> = { value: 0 };
   /** Of the cell that is drawn next. */
   readonly fade: IUniform<number> = { value: 0 };
+  readonly light: Light;
   private readonly shared: Uniforms;
   private readonly defines: Readonly<Record<string, string>>;
   private readonly fragment: string;
@@ -124,6 +125,7 @@ export class NearMaterials {
    * @param fades whether cells ever fade: asking that costs time in every pixel
    */
   constructor(light: Light, nearField: number, fades: boolean) {
+    this.light = light;
     this.shared = { ff_top: this.top, ff_fade: this.fade };
     this.fragment = fragment(light);
     this.defines = {

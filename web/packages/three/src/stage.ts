@@ -17,6 +17,7 @@ import { fadeWith } from './fade.js';
 import { createFarMaterial } from './far-material.js';
 import { NearMaterials } from './near-materials.js';
 import { NearTextures } from './near-textures.js';
+import { Shapes } from './objects/shapes.js';
 import { PagePool } from './page-pool.js';
 import { createSky, type Sky } from './sky.js';
 
@@ -32,6 +33,8 @@ export interface StageOptions {
   readonly geometryBytes: number;
   readonly prefetch: number;
   readonly sky: boolean;
+  /** Draw objects that repeat as true impostors where that is wanted. */
+  readonly repeats: boolean;
   readonly backgroundAlpha: IUniform<number>;
   /** Whether cells ever fade. */
   readonly fades: boolean;
@@ -41,12 +44,15 @@ export interface StageOptions {
 
 /** Share of the texture memory that atlas pages get; textures of near geometry get the rest. */
 const PAGE_SHARE = 0.6;
+/** The share of objects that repeat, where they are drawn. */
+const SHAPE_SHARE = 0.1;
 
 export class Stage {
   readonly uploads = new UploadScheduler();
   readonly attributes: AttributeUpload;
   readonly pages: PagePool;
   readonly textures: NearTextures;
+  readonly shapes: Shapes | undefined;
   readonly streamer: CellStreamer<CellView>;
   readonly sky: Sky | undefined;
   private readonly materials: NearMaterials;
@@ -71,11 +77,17 @@ export class Stage {
       renderer,
       queue,
       uploads,
-      capacity: Math.max(0, options.textureBytes - this.pages.bytes),
+      capacity: Math.max(
+        0,
+        (options.repeats ? 1 - SHAPE_SHARE : 1) * options.textureBytes - this.pages.bytes,
+      ),
       pressure,
     });
     this.materials = new NearMaterials(light, near_field, options.fades);
     this.farMaterial = createFarMaterial(this.pages.texture, this.materials.fade, options.fades);
+    this.shapes = options.repeats
+      ? new Shapes(manifest, queue, SHAPE_SHARE * options.textureBytes)
+      : undefined;
     this.loader = new CellLoader({
       manifest,
       queue,
@@ -85,6 +97,7 @@ export class Stage {
       materials: this.materials,
       farMaterial: this.farMaterial,
       attributes: this.attributes,
+      shapes: this.shapes,
       compile: async (view) => {
         const camera = options.camera();
         if (camera !== undefined) await renderer.compileAsync(view.group, camera);
@@ -113,6 +126,7 @@ export class Stage {
     this.loader.dispose();
     this.pages.dispose();
     this.textures.clear();
+    this.shapes?.clear();
     this.materials.dispose();
     this.farMaterial.dispose();
     this.attributes.group.removeFromParent();
@@ -129,6 +143,13 @@ export class Stage {
   private prepare(view: CellView): void {
     const { fade, top } = this.materials;
     const viewport = new Vector4();
+    for (const mesh of view.copies?.meshes ?? []) {
+      const prepare = mesh.onBeforeRender.bind(mesh);
+      mesh.onBeforeRender = (...all) => {
+        fade.value = view.fade;
+        prepare(...all);
+      };
+    }
     for (const mesh of view.farMeshes) {
       mesh.onBeforeRender = (_renderer, _scene, camera) => {
         fadeWith(view, mesh, fade);

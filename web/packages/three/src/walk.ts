@@ -51,7 +51,10 @@ export interface WalkOptions {
   readonly queue?: FetchQueue;
   /** Seconds in which one cell fades into the next. Default 0: at once. */
   readonly fade?: number;
-  /** Whether costly objects of the near field are drawn as impostors. Default 'never'. */
+  /**
+   * Whether costly objects of the near field are drawn as impostors. Default 'never'; then it may be
+   * changed later, but objects that repeat stay polygons.
+   */
   readonly nearImpostors?: NearImpostors;
 }
 
@@ -291,6 +294,7 @@ export class Walk extends EventDispatcher<WalkEvents> {
       geometryBytes: this.options.geometryBytes ?? 192 * MEGABYTE,
       prefetch: this.options.prefetch ?? 12,
       sky: this.options.sky ?? true,
+      repeats: ['auto', 'copies'].includes(this.objects.near),
       backgroundAlpha: this.alpha,
       fades: (this.options.fade ?? 0) > 0,
       onReady: (cell, seconds) => {

@@ -55,6 +55,7 @@ function batchOf(places: readonly number[]): NearBatch {
     uvs: new Float32Array(0),
     colors: new Uint16Array(4 * vertices),
     indices: Uint32Array.from(indices),
+    owners: new Int32Array(0),
   };
 }
 

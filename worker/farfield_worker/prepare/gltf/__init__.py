@@ -49,7 +49,9 @@ def read_gltf(folder: ModelFolder, limits: Limits) -> Model:
     parts: dict[int, list[int]] = {}
     placed: list[np.ndarray] = []
     matrices: list[np.ndarray] = []
-    triangles = 0
+    shapes: list[np.ndarray] = []
+    copies: list[np.ndarray] = []
+    triangles = standing = 0
     for index, worlds in placed_meshes(accessors):
         if index not in parts:
             parts[index] = []
@@ -62,10 +64,19 @@ def read_gltf(folder: ModelFolder, limits: Limits) -> Model:
             triangles += len(meshes[part].triangles) * len(worlds)
             placed.append(np.full(len(worlds), part, np.int32))
             matrices.append(worlds)
+            shapes.append(np.full(len(worlds), index, np.int32))
+            copies.append(np.arange(standing, standing + len(worlds), dtype=np.int32))
+        standing += len(worlds)
         if triangles > limits.triangles:
             document.refuse(f"it has more than {limits.triangles} triangles")
     if not placed:
         document.refuse("it holds no triangles")
     return Model(
-        meshes, materials, np.concatenate(placed), np.concatenate(matrices), document.notes
+        meshes,
+        materials,
+        np.concatenate(placed),
+        np.concatenate(matrices),
+        document.notes,
+        np.concatenate(shapes),
+        np.concatenate(copies),
     )

@@ -1,6 +1,7 @@
 /** Object impostors: what needs no engine. */
 
 export * from './billboard.js';
+export * from './copies.js';
 export * from './fade.js';
 export * from './find-objects.js';
 export * from './freshness.js';

@@ -29,25 +29,39 @@ export function objectLayers({ textures }: ObjectFile): number {
 
 /** Read object.json; throws FarfieldError 'format'. */
 export function parseObject(text: string): ObjectFile {
-  let file: ObjectFile;
+  let file: Partial<Record<keyof ObjectFile, unknown>> | null;
   try {
-    file = JSON.parse(text) as ObjectFile;
+    file = JSON.parse(text) as Partial<Record<keyof ObjectFile, unknown>> | null;
   } catch {
     throw new FarfieldError('format', 'An object file is not JSON.');
   }
-  const { format, version } = file as { format: unknown; version: unknown };
-  if (format !== 'farfield-object' || version !== 1) {
+  if (file?.format !== 'farfield-object' || file.version !== 1) {
     throw new FarfieldError('format', 'An object file is not of the version this viewer reads.');
   }
-  const fits =
-    Number.isInteger(file.resolution) &&
-    file.resolution > 0 &&
-    Number.isInteger(file.textures) &&
-    file.textures > 0 &&
-    [...file.axes].sort().join() === '0,1,2' &&
-    [0, 1, 2].every((axis) => file.high[axis] > file.low[axis]);
-  if (!fits) throw new FarfieldError('format', 'An object file contradicts itself.');
-  return file;
+  if (!fits(file)) throw new FarfieldError('format', 'An object file contradicts itself.');
+  return file as unknown as ObjectFile;
+}
+
+/** Whether what decides memory and mathematics is as docs/format.md says. */
+function fits(file: Partial<Record<keyof ObjectFile, unknown>>): boolean {
+  const { low, high, axes, resolution, textures, image, error } = file;
+  const within = (value: unknown, least: number, most: number): boolean =>
+    Number.isInteger(value) && Number(value) >= least && Number(value) <= most;
+  const triple = (value: unknown): value is Vec3 =>
+    Array.isArray(value) && value.length === 3 && value.every((n) => Number.isFinite(n));
+  return (
+    triple(low) &&
+    triple(high) &&
+    [0, 1, 2].every((axis) => high[axis] > low[axis]) &&
+    triple(axes) &&
+    [...axes].sort().join() === '0,1,2' &&
+    within(resolution, 2, 4096) &&
+    within(textures, 1, 8) &&
+    typeof image === 'string' &&
+    /^[0-9A-Za-z._-]+$/.test(image) &&
+    typeof error === 'number' &&
+    error >= 0
+  );
 }
 
 /**

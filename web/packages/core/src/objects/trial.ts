@@ -1,69 +1,75 @@
 /**
- * Whether impostors pay, found out by trying: frames are timed with and without them by turns, and
- * the faster way is kept until the next trial. Medians, because single frames wait for other things.
+ * Which way of drawing is fastest, found out by trying: frames are timed in each way by turns, and the
+ * fastest is kept until the next trial. Medians, because single frames wait for other things.
  */
 
 export interface TrialOptions {
+  /** How many ways there are; the first is the plain one. Default 2. */
+  readonly ways?: number;
   /** Frames of each measurement. Default 40. */
   readonly frames?: number;
   /** Frames at the beginning of each that are not counted. Default 15. */
   readonly warmUp?: number;
   /** Seconds between two trials. Default 30. */
   readonly every?: number;
-  /** With must take no more than this share of without. Default 0.95. */
+  /** Another way must take no more than this share of the plain one. Default 0.95. */
   readonly gain?: number;
   /** A frame this short needs no help, seconds. Default 1/55. */
   readonly enough?: number;
 }
 
-type Phase = 'without' | 'with' | 'decided';
-
 export class Trial {
-  /** Whether impostors are wanted now. */
-  on = false;
+  /** The way to draw now. */
+  way = 0;
   private readonly options: Required<TrialOptions>;
-  private phase: Phase = 'without';
+  private decided = false;
   private times: number[] = [];
   private seen = 0;
-  private without = 0;
+  /** Median of each way tried so far. */
+  private medians: number[] = [];
   private decidedAt = 0;
 
   constructor(options: TrialOptions = {}) {
-    this.options = { frames: 40, warmUp: 15, every: 30, gain: 0.95, enough: 1 / 55, ...options };
+    this.options = {
+      ways: 2,
+      frames: 40,
+      warmUp: 15,
+      every: 30,
+      gain: 0.95,
+      enough: 1 / 55,
+      ...options,
+    };
   }
 
   /** Begin anew, as after another cell is shown whose geometry costs something else. */
   restart(): void {
-    this.phase = 'without';
-    this.on = false;
+    this.way = 0;
+    this.decided = false;
     this.times = [];
+    this.medians = [];
     this.seen = 0;
   }
 
   /** Tell how long the last frame took and what time it is, both in seconds. */
   frame(seconds: number, now: number): void {
-    if (this.phase === 'decided') {
-      if (now - this.decidedAt > this.options.every) this.restart();
+    const { ways, frames, warmUp, every, gain, enough } = this.options;
+    if (this.decided) {
+      if (now - this.decidedAt > every) this.restart();
       return;
     }
-    if (++this.seen > this.options.warmUp) this.times.push(seconds);
-    if (this.times.length < this.options.frames) return;
-    const median = this.times.sort((a, b) => a - b)[this.times.length >> 1];
+    if (++this.seen > warmUp) this.times.push(seconds);
+    if (this.times.length < frames) return;
+    const { medians } = this;
+    medians.push(this.times.sort((a, b) => a - b)[this.times.length >> 1]);
     this.times = [];
     this.seen = 0;
-    if (this.phase === 'without') {
-      this.without = median;
-      if (median <= this.options.enough) this.decide(false, now);
-      else {
-        this.phase = 'with';
-        this.on = true;
-      }
-    } else this.decide(median <= this.options.gain * this.without, now);
-  }
-
-  private decide(on: boolean, now: number): void {
-    this.on = on;
-    this.phase = 'decided';
+    if (medians.length < ways && medians[0] > enough) {
+      this.way = medians.length;
+      return;
+    }
+    const fastest = medians.indexOf(Math.min(...medians));
+    this.way = medians[fastest] <= gain * medians[0] ? fastest : 0;
+    this.decided = true;
     this.decidedAt = now;
   }
 }

@@ -60,7 +60,7 @@ describe('Trial', () => {
   /** Run a trial to its decision; returns the frames it took. */
   function decide(trial: Trial, without: number, withThem: number): number {
     let frames = 0;
-    for (; frames < 200; frames++) trial.frame(trial.on ? withThem : without, 0);
+    for (; frames < 200; frames++) trial.frame(trial.way === 1 ? withThem : without, 0);
     return frames;
   }
 
@@ -68,7 +68,7 @@ describe('Trial', () => {
     const outcome = (without: number, withThem: number): boolean => {
       const trial = new Trial();
       decide(trial, without, withThem);
-      return trial.on;
+      return trial.way === 1;
     };
     expect(outcome(0.05, 0.02)).toBe(true);
     expect(outcome(0.05, 0.049)).toBe(false);
@@ -76,22 +76,34 @@ describe('Trial', () => {
     expect(outcome(0.016, 0.001)).toBe(false); // fast enough without
   });
 
+  test('of several ways takes the fastest', () => {
+    const outcome = (...times: number[]): number => {
+      const trial = new Trial({ ways: times.length });
+      for (let n = 0; n < 300; n++) trial.frame(times[trial.way], 0);
+      return trial.way;
+    };
+    expect(outcome(0.05, 0.03, 0.02)).toBe(2);
+    expect(outcome(0.05, 0.02, 0.03)).toBe(1);
+    expect(outcome(0.05, 0.08, 0.049)).toBe(0);
+    expect(outcome(0.05, 0.08, 0.04)).toBe(2);
+  });
+
   test('single slow frames change nothing', () => {
     const trial = new Trial();
-    for (let n = 0; n < 200; n++) trial.frame(n % 7 === 0 ? 1 : trial.on ? 0.02 : 0.05, 0);
-    expect(trial.on).toBe(true);
+    for (let n = 0; n < 200; n++) trial.frame(n % 7 === 0 ? 1 : trial.way === 1 ? 0.02 : 0.05, 0);
+    expect(trial.way).toBe(1);
   });
 
   test('tries again after a while, and when told to', () => {
     const trial = new Trial({ every: 10 });
     decide(trial, 0.05, 0.02);
-    expect(trial.on).toBe(true);
+    expect(trial.way).toBe(1);
     trial.frame(0.02, 11);
-    expect(trial.on).toBe(false);
+    expect(trial.way).toBe(0);
     decide(trial, 0.05, 0.06);
-    expect(trial.on).toBe(false);
+    expect(trial.way).toBe(0);
     trial.restart();
     decide(trial, 0.05, 0.02);
-    expect(trial.on).toBe(true);
+    expect(trial.way).toBe(1);
   });
 });

@@ -3,6 +3,7 @@ import { describe, expect, test } from 'vitest';
 import {
   LIMITS,
   boxCorners,
+  PictureBudget,
   chooseNext,
   facingBasis,
   frameBox,
@@ -212,14 +213,21 @@ describe('judge', () => {
 
 describe('chooseNext', () => {
   test('takes the nearest first, of equally near ones the oldest, of equally old ones the expired', () => {
-    const near = { distance: 5, waited: 0, expired: false };
-    const far = { distance: 50, waited: 0, expired: false };
-    const old = { distance: 50, waited: 5, expired: false };
-    const gone = { distance: 50, waited: 0, expired: true };
+    const near = { distance: 5, waited: 0, expired: false, cost: 1 };
+    const far = { distance: 50, waited: 0, expired: false, cost: 1 };
+    const old = { distance: 50, waited: 5, expired: false, cost: 1 };
+    const gone = { distance: 50, waited: 0, expired: true, cost: 1 };
     expect(chooseNext([far, old, near], 2)).toEqual([near, old]);
     expect(chooseNext([far, gone], 1)).toEqual([gone]);
     expect(chooseNext([far, gone], 0)).toEqual([]);
     expect(chooseNext([far], 0)).toEqual([]);
+  });
+
+  test('stops once the budget is spent, but takes one whatever it costs', () => {
+    const of = (cost: number) => ({ distance: 5, waited: 0, expired: false, cost });
+    const all = [of(4), of(3), of(2)];
+    const counts = [0, 4, 5, 7, 8].map((budget) => chooseNext(all, 8, budget).length);
+    expect(counts).toEqual([1, 1, 2, 2, 3]);
   });
 
   test('nothing waits for ever', () => {
@@ -228,7 +236,12 @@ describe('chooseNext', () => {
         fc.array(fc.double({ min: 1, max: 100, noNaN: true }), { minLength: 1, maxLength: 60 }),
         fc.integer({ min: 1, max: 6 }),
         (distances, most) => {
-          const all = distances.map((away) => ({ distance: away, waited: 0, expired: false }));
+          const all = distances.map((away) => ({
+            distance: away,
+            waited: 0,
+            expired: false,
+            cost: 1,
+          }));
           const longest = all.map(() => 0);
           for (let frame = 0; frame < 3000; frame++) {
             const chosen = new Set(chooseNext(all, most));
@@ -244,5 +257,50 @@ describe('chooseNext', () => {
       ),
       { numRuns: 20 },
     );
+  });
+});
+
+describe('PictureBudget', () => {
+  const waiting = Array.from({ length: 12 }, () => ({
+    distance: 5,
+    waited: 1,
+    expired: false,
+    cost: 1000,
+  }));
+
+  test('spreads what is due over frames, and spends no more than its time', () => {
+    const budget = new PictureBudget(4);
+    expect(budget.allowance(waiting)).toBe(0);
+    budget.spent(1000, 0.1);
+    expect(budget.allowance(waiting)).toBe(4000);
+    for (let n = 0; n < 100; n++) budget.spent(1000, 2); // 2 ms for one
+    expect(budget.allowance(waiting)).toBe(2000);
+    budget.spent(0, 5);
+    expect(budget.allowance(waiting)).toBe(2000);
+  });
+
+  test('learns what pictures cost', () => {
+    const budget = new PictureBudget(4);
+    budget.spent(1000, 100); // the first one compiles programs
+    budget.spent(1000, 0.5);
+    expect(budget.allowance(waiting)).toBe(4000);
+    budget.spent(1000, 100); // and one waited for something else
+    expect(budget.allowance(waiting)).toBe(4000);
+    for (let n = 0; n < 100; n++) budget.spent(1000, 2);
+    expect(budget.allowance(waiting)).toBe(2000);
+  });
+
+  test('objects that grow stale together become fresh within a few frames', () => {
+    const all = waiting.map((one) => ({ ...one, waited: 0 }));
+    const budget = new PictureBudget(1000);
+    budget.spent(1, 1e-3);
+    const taken: number[] = [];
+    let left = all;
+    while (left.length > 0) {
+      const chosen = chooseNext(left, 8, budget.allowance(left));
+      taken.push(chosen.length);
+      left = left.filter((one) => !chosen.includes(one));
+    }
+    expect(taken).toEqual([4, 3, 2, 1, 1, 1]);
   });
 });

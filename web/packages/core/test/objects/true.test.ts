@@ -54,6 +54,12 @@ describe('object.json', () => {
     [JSON.stringify({ ...FILE, axes: [0, 0, 1] }), 'contradicts'],
     [JSON.stringify({ ...FILE, high: [1, -1, 1] }), 'contradicts'],
     [JSON.stringify({ ...FILE, resolution: 0 }), 'contradicts'],
+    [JSON.stringify({ ...FILE, resolution: 1e6 }), 'contradicts'],
+    [JSON.stringify({ ...FILE, textures: 9 }), 'contradicts'],
+    [JSON.stringify({ ...FILE, image: '../elsewhere.png' }), 'contradicts'],
+    [JSON.stringify({ ...FILE, error: null }), 'contradicts'],
+    [JSON.stringify({ format: 'farfield-object', version: 1 }), 'contradicts'],
+    ['null', 'version'],
   ])('is refused in a sentence: %s', (text, says) => {
     expect(() => parseObject(text)).toThrow(FarfieldError);
     expect(() => parseObject(text)).toThrow(says);

@@ -1,6 +1,6 @@
-/** The box of an object in its own space, without its scale. */
+/** The box of an object in its own space, without its scale, and what drawing it costs. */
 
-import type { Bounds } from '@farfield/core';
+import { pictureCost, type Bounds } from '@farfield/core';
 import { Box3, Matrix4, Mesh, SkinnedMesh, type Object3D } from 'three';
 import { rigidPose } from './picture-taker.js';
 
@@ -40,4 +40,17 @@ export function objectBounds(object: Object3D): Bounds | undefined {
   // A flat object has no inside, but its billboard needs a size.
   whole.expandByScalar(1e-3 * whole.min.distanceTo(whole.max) + 1e-6);
   return { min: whole.min.toArray(), max: whole.max.toArray() };
+}
+
+/** What a picture of `object` costs. */
+export function objectCost(object: Object3D): number {
+  let [triangles, calls] = [0, 0];
+  object.traverse((child) => {
+    if (!(child instanceof Mesh)) return;
+    const { geometry, material } = child as Mesh;
+    const corners = geometry.index?.count ?? geometry.attributes.position.count;
+    triangles += Math.min(corners, geometry.drawRange.count) / 3;
+    calls += Array.isArray(material) ? material.length : 1;
+  });
+  return pictureCost(triangles, calls);
 }

@@ -26,7 +26,7 @@ import {
 } from '@farfield/core';
 import { Box3, Matrix4, Sphere, Vector3, type Frustum, type Object3D } from 'three';
 import type { Instance } from './billboards.js';
-import { objectBounds } from './bounds.js';
+import { objectBounds, objectCost } from './bounds.js';
 import { rigidPose } from './picture-taker.js';
 
 export interface ImpostorOptions {
@@ -76,6 +76,8 @@ export class ObjectImpostor {
   readonly fade = new Fade();
   /** Frames since its picture stopped being good enough. */
   waited = 0;
+  /** What a picture costs, see `pictureCost`. */
+  cost = 0;
   sight: Sight | undefined;
   shot: Shot | undefined;
   private old: Shot | undefined;
@@ -146,6 +148,7 @@ export class ObjectImpostor {
   measure(): void {
     this.object.updateWorldMatrix(true, true);
     this.box = objectBounds(this.object);
+    this.cost = objectCost(this.object);
   }
 
   /** A picture is about to be taken into `slot`; returns how. */

@@ -3,7 +3,7 @@
  * given to `add` is drawn as a picture of itself for as long as that is good enough.
  */
 
-import { chooseNext, type Slot, type Vec3 } from '@farfield/core';
+import { PictureBudget, chooseNext, type Slot, type Vec3, type Waiting } from '@farfield/core';
 import {
   Frustum,
   Group,
@@ -25,6 +25,8 @@ export interface ObjectImpostorsOptions {
   readonly atlas?: number;
   /** Pictures taken in one frame at most. Default 8. */
   readonly perFrame?: number;
+  /** Milliseconds of a frame that pictures may take of the main thread. Default 4. */
+  readonly milliseconds?: number;
   /** Seconds that a fade takes. Default 0.25. */
   readonly fade?: number;
 }
@@ -49,6 +51,7 @@ export class ObjectImpostors {
   private readonly renderer: WebGLRenderer;
   private readonly perFrame: number;
   private readonly fade: number;
+  private readonly budget: PictureBudget;
   private readonly atlas: AtlasTarget;
   private readonly taker: PictureTaker;
   private readonly billboards: Billboards;
@@ -61,6 +64,7 @@ export class ObjectImpostors {
     const size = Math.min(options.atlas ?? 2048, largest);
     this.perFrame = options.perFrame ?? 8;
     this.fade = options.fade ?? 0.25;
+    this.budget = new PictureBudget(options.milliseconds ?? 4);
     this.atlas = new AtlasTarget(size);
     this.taker = new PictureTaker(options.renderer, this.atlas);
     this.billboards = new Billboards(this.atlas.target.texture, size);
@@ -92,8 +96,7 @@ export class ObjectImpostors {
   update(camera: Camera, now = performance.now() / 1000): void {
     const eye = this.eye(camera);
     const seen: ObjectImpostor[] = [];
-    const waiting: { item: ObjectImpostor; distance: number; waited: number; expired: boolean }[] =
-      [];
+    const waiting: (Waiting & { item: ObjectImpostor })[] = [];
     for (const item of this.items.values()) {
       item.object.updateWorldMatrix(true, false);
       if (!item.look(eye)) continue;
@@ -106,12 +109,12 @@ export class ObjectImpostors {
       }
       item.waited++;
       const distance = item.sight?.distance ?? Infinity;
-      waiting.push({ item, distance, waited: item.waited, expired: state === 'expired' });
+      const { waited, cost } = item;
+      waiting.push({ item, distance, waited, expired: state === 'expired', cost });
     }
-    const orders = chooseNext(waiting, this.perFrame).flatMap(({ item }) =>
-      this.order(item, seen, now),
-    );
-    this.taker.take(orders, rootOf(this.group));
+    const chosen = chooseNext(waiting, this.perFrame, this.budget.allowance(waiting));
+    const orders = chosen.flatMap(({ item }) => this.order(item, seen, now));
+    this.take(orders);
     const instances: Instance[] = [];
     for (const item of seen) item.show(instances, eye, now, this.fade);
     this.counts.pictures = seen.filter(({ object }) => !object.visible).length;
@@ -133,6 +136,19 @@ export class ObjectImpostors {
     this.group.removeFromParent();
   }
 
+  /** Pixels per unit of slope. */
+  focal(camera: Camera): number {
+    const { height } = this.renderer.getDrawingBufferSize(new Vector2());
+    return (camera.projectionMatrix.elements[5] * height) / 2;
+  }
+
+  private take(orders: readonly Order[]): void {
+    const start = performance.now();
+    this.taker.take(orders, rootOf(this.group));
+    const cost = orders.reduce((sum, order) => sum + order.cost, 0);
+    this.budget.spent(cost, performance.now() - start);
+  }
+
   /** Make room for an item's picture and say how it is taken. */
   private order(item: ObjectImpostor, seen: readonly ObjectImpostor[], now: number): Order[] {
     const size = item.wantedSlot;
@@ -147,7 +163,7 @@ export class ObjectImpostors {
       return [];
     }
     item.object.visible = true;
-    return [{ object: item.object, frame, pose: item.pose, slot }];
+    return [{ object: item.object, frame, pose: item.pose, slot, cost: item.cost }];
   }
 
   /** Drop pictures that are out of sight until a slot is free. */
@@ -184,7 +200,6 @@ export class ObjectImpostors {
       return [v.x, v.y, v.z];
     };
     const projection = camera.projectionMatrix.elements;
-    const { height } = this.renderer.getDrawingBufferSize(new Vector2());
     const view = new Matrix4().multiplyMatrices(
       camera.projectionMatrix,
       camera.matrixWorld.clone().invert(),
@@ -193,7 +208,7 @@ export class ObjectImpostors {
       position: new Vector3().setFromMatrixPosition(camera.matrixWorld),
       basis: { right: axis(0, 1), up: axis(1, 1), forward: axis(2, -1) },
       frustum: new Frustum().setFromProjectionMatrix(view),
-      focal: (projection[5] * height) / 2,
+      focal: this.focal(camera),
       near: projection[14] / (projection[10] - 1),
     };
   }

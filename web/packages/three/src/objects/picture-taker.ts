@@ -26,6 +26,8 @@ export interface Order {
   /** The object's space without its scale, in world space. */
   readonly pose: Matrix4;
   readonly slot: Slot;
+  /** See `pictureCost`. */
+  readonly cost: number;
 }
 
 /** Where the near plane lies between the eye and the box. */

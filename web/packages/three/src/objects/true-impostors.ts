@@ -1,6 +1,7 @@
 /** Many instances of one true impostor, in one draw call. */
 
 import {
+  FarfieldError,
   backToFront,
   objectLayers,
   parseObject,
@@ -25,9 +26,10 @@ import {
   Vector2,
   Vector3,
   type Camera,
+  type IUniform,
   type WebGLRenderer,
 } from 'three';
-import { lightUniforms } from '../light.js';
+import { lightUniforms, type Uniforms } from '../light.js';
 import { TRUE_FRAGMENT, TRUE_VERTEX } from './true-shader.js';
 
 /** A baked object, ready to be drawn. */
@@ -39,7 +41,8 @@ export interface BakedObject {
 export interface TrueImpostorOptions {
   /** Default `opaque`. `glass` bends light at every surface, `translucent` lets it through. */
   readonly kind?: 'opaque' | 'translucent' | 'glass';
-  readonly light: Light;
+  /** Constants of the light model, or their uniforms. */
+  readonly light: Light | Uniforms;
   /** Shadows that an opaque object casts on itself. Default false. */
   readonly shadow?: boolean;
   /** Share of light that an opaque object mirrors. Default 0. */
@@ -50,37 +53,61 @@ export interface TrueImpostorOptions {
   readonly absorb?: readonly [number, number, number];
   /** Most steps of a ray. Default 96. */
   readonly steps?: number;
+  /** Steps for each pixel that the object is across. Default 0.75. */
+  readonly stepsPerPixel?: number;
+  /** The cell fade of the walk that it is part of. */
+  readonly fade?: IUniform<number>;
 }
 
 /** Load what `farfield bake-object` has written; throws FarfieldError 'format'. */
 export async function loadObject(url: string): Promise<BakedObject> {
   const file = parseObject(await (await fetch(url)).text());
-  const bytes = await fetch(new URL(file.image, new URL(url, location.href)));
+  const image = await fetch(new URL(file.image, new URL(url, location.href)));
+  return decodeObject(file, await image.arrayBuffer());
+}
+
+/** The object of a file whose picture is these bytes; throws FarfieldError 'format'. */
+export async function decodeObject(file: ObjectFile, png: ArrayBuffer): Promise<BakedObject> {
   // Heights are numbers: no colour space, no alpha, nothing may touch them.
-  const bitmap = await createImageBitmap(await bytes.blob(), {
+  const bitmap = await createImageBitmap(new Blob([png], { type: 'image/png' }), {
     colorSpaceConversion: 'none',
     premultiplyAlpha: 'none',
   });
   const { resolution } = file;
   const layers = objectLayers(file);
-  const canvas = document.createElement('canvas');
-  const gl = canvas.getContext('webgl2');
-  if (gl === null) throw new Error('Objects need WebGL 2.');
-  // A 2D canvas would multiply colours by alpha; a texture gives the bytes back as they were.
-  gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
-  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
-  gl.bindFramebuffer(gl.FRAMEBUFFER, gl.createFramebuffer());
-  const texture = gl.getParameter(gl.TEXTURE_BINDING_2D) as WebGLTexture;
-  gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
-  const data = new Uint8Array(4 * resolution * resolution * layers);
-  gl.readPixels(0, 0, resolution, resolution * layers, gl.RGBA, gl.UNSIGNED_BYTE, data);
-  gl.getExtension('WEBGL_lose_context')?.loseContext();
+  if (bitmap.width !== resolution || bitmap.height !== resolution * layers) {
+    throw new FarfieldError('format', "An object's picture has not the size that its file says.");
+  }
+  const data = readBytes(bitmap);
   const fields = new DataArrayTexture(data, resolution, resolution, layers);
   fields.format = RGBAFormat;
   fields.type = UnsignedByteType;
   fields.minFilter = fields.magFilter = NearestFilter;
   fields.needsUpdate = true;
   return { file, texture: fields };
+}
+
+let reader: WebGL2RenderingContext | undefined;
+
+/** The bytes of a picture, RGBA. A 2D canvas would multiply colours by alpha; a texture does not. */
+function readBytes(bitmap: ImageBitmap): Uint8Array<ArrayBuffer> {
+  // One context for all: browsers allow few, and drop the oldest.
+  if (reader === undefined || reader.isContextLost()) {
+    reader = new OffscreenCanvas(1, 1).getContext('webgl2') ?? undefined;
+  }
+  if (reader === undefined) throw new FarfieldError('unsupported', 'Objects need WebGL 2.');
+  const gl = reader;
+  const [texture, frame] = [gl.createTexture(), gl.createFramebuffer()];
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+  gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+  const data = new Uint8Array(4 * bitmap.width * bitmap.height);
+  gl.readPixels(0, 0, bitmap.width, bitmap.height, gl.RGBA, gl.UNSIGNED_BYTE, data);
+  gl.deleteFramebuffer(frame);
+  gl.deleteTexture(texture);
+  bitmap.close();
+  return data;
 }
 
 export class TrueImpostors extends Mesh<InstancedBufferGeometry, RawShaderMaterial> {
@@ -169,8 +196,9 @@ function makeMaterial(
   const defines: Record<string, string> = {
     TEXTURES: String(file.textures),
     MOST_STEPS: String(options.steps ?? 96),
-    STEPS_PER_PIXEL: '0.75',
+    STEPS_PER_PIXEL: (options.stepsPerPixel ?? 0.75).toFixed(4),
   };
+  if (options.fade !== undefined) defines.FADE = '';
   if (kind === 'glass') defines.GLASS = '';
   if (kind === 'translucent') defines.TRANSLUCENT = '';
   if (options.shadow === true) defines.SHADOW = '';
@@ -182,7 +210,8 @@ function makeMaterial(
     fragmentShader: TRUE_FRAGMENT,
     defines,
     uniforms: {
-      ...lightUniforms(options.light),
+      ...('ambient' in options.light ? lightUniforms(options.light as Light) : options.light),
+      ff_fade: options.fade ?? { value: 0 },
       ff_eye: { value: new Vector3() },
       ff_focal: { value: 1 },
       ff_middle: { value: low.clone().add(high).multiplyScalar(0.5) },

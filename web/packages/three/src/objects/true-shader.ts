@@ -4,6 +4,7 @@
  * computed in the object's own space, in which the box is [0, 1]³ and heights run along z.
  */
 
+import { FADE_GLSL } from '../fade.js';
 import { CLIP_GLSL } from '../projection.js';
 import { LIGHT_GLSL } from '../shading.generated.js';
 
@@ -67,6 +68,7 @@ in vec3 v_point;
 out vec4 color;
 ${CLIP_GLSL}
 ${LIGHT_GLSL}
+${FADE_GLSL}
 vec3 turn(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
 
 // Metres -> the unit box.
@@ -220,6 +222,9 @@ vec3 through(vec3 from, vec3 ray, vec2 t, out vec3 first) {
 #endif
 
 void main() {
+#ifdef FADE
+  if (ff_faded()) discard;
+#endif
   vec3 origin = to_unit(v_eye);
   vec3 ray = to_unit(v_point) - origin;
   vec2 t = cross_box(origin, ray);

@@ -8,17 +8,20 @@ import type { ImpostorOptions } from './object-impostor.js';
 import { ObjectImpostors, type ImpostorStats } from './object-impostors.js';
 
 /**
- * Whether near-field objects are drawn as impostors: `auto` tries whether that makes frames shorter,
- * and keeps what is faster.
+ * How near-field objects are drawn: `never` as impostors, `always` as pictures that are taken now and
+ * then, `copies`: those of which there are many from height fields, where their error is below a pixel.
+ * `auto` tries all three and keeps what makes the shortest frames.
  */
-export type NearImpostors = 'auto' | 'always' | 'never';
+export type NearImpostors = 'auto' | 'always' | 'copies' | 'never';
+
+const WAYS: readonly NearImpostors[] = ['never', 'always', 'copies'];
 
 export interface WalkObjectsOptions {
   readonly renderer: WebGLRenderer;
   readonly builder: CellBuilder;
   /** The walk's group. */
   readonly group: Group;
-  readonly near: NearImpostors;
+  near: NearImpostors;
 }
 
 /** Fewest triangles of a near-field object that are worth a picture. */
@@ -29,7 +32,8 @@ const LARGEST = 0.35;
 export class WalkObjects {
   readonly impostors: ObjectImpostors;
   private readonly options: WalkObjectsOptions;
-  private readonly trial = new Trial();
+  private readonly trial = new Trial({ ways: WAYS.length });
+  private copies = 0;
   private readonly found = new WeakMap<CellView, NearObjects | 'asked'>();
   private shown: NearObjects | undefined;
   private view: CellView | undefined;
@@ -61,14 +65,28 @@ export class WalkObjects {
     const clock = performance.now() / 1000;
     if (this.last !== undefined) this.trial.frame(clock - this.last, clock);
     this.last = clock;
-    const { near } = this.options;
-    const wanted = near === 'always' || (near === 'auto' && this.trial.on);
-    this.showNear(wanted ? this.nearObjects(view, nearField) : undefined);
+    const { way } = this;
+    this.showNear(way === 'always' ? this.nearObjects(view, nearField) : undefined);
+    this.copies = this.showCopies(view, way === 'copies' ? this.impostors.focal(camera) : Infinity);
     this.impostors.update(camera, now);
   }
 
-  get stats(): ImpostorStats {
-    return this.impostors.stats;
+  get stats(): ImpostorStats & { readonly copies: number } {
+    return { ...this.impostors.stats, copies: this.copies };
+  }
+
+  /** How near-field objects are drawn now: what `auto` has come to. */
+  get way(): NearImpostors {
+    return this.options.near === 'auto' ? WAYS[this.trial.way] : this.options.near;
+  }
+
+  /** How near-field objects are drawn from the next frame on. */
+  get near(): NearImpostors {
+    return this.options.near;
+  }
+
+  set near(near: NearImpostors) {
+    this.options.near = near;
   }
 
   /** The graphics context was lost; views are built anew. */
@@ -80,6 +98,11 @@ export class WalkObjects {
   dispose(): void {
     this.showNear(undefined);
     this.impostors.dispose();
+  }
+
+  /** Returns how many copies are drawn from height fields. */
+  private showCopies(view: CellView | undefined, focal: number): number {
+    return view?.copies?.show(view.near, focal) ?? 0;
   }
 
   private showNear(next: NearObjects | undefined): void {
