@@ -50,8 +50,9 @@ def test_every_figure_is_there(walk: Path, tmp_path: Path) -> None:
     figures = figures_of(walk, "--sheet", tmp_path / "sheet.png")
     assert len(figures["cells"]) == 2
     for part in (figures["overall"], *figures["cells"].values()):
-        assert set(part) == NAMES | {"floor", "fine"}
-        assert set(part["floor"]) == set(part["fine"]["floor"]) == NAMES
+        assert set(part) == NAMES | {"floor", "fine", "corners"}
+        for whole in (part, part["fine"], part["corners"]):
+            assert set(whole["floor"]) == NAMES
         for name in ("wrong", "missing", "extra", "flip"):
             assert 0 <= part["floor"][name] <= 1
             assert 0 <= part[name] <= 1
@@ -61,8 +62,16 @@ def test_every_figure_is_there(walk: Path, tmp_path: Path) -> None:
         assert part["pop"] is not None
         assert part["floor"]["pop"] == part["floor"]["flip"]
         assert part["fine"]["pixels"] > 2 * part["pixels"]
+        assert part["corners"]["pixels"] < part["pixels"]
     with Image.open(tmp_path / "sheet.png") as sheet:
         assert sheet.width == 3 * 320
+
+
+def test_views_may_have_other_pixels_than_faces_have_texels(walk: Path) -> None:
+    coarse, usual = (figures_of(walk, *more)["overall"] for more in (("--pixels", 64), ()))
+    assert coarse["fine"]["pixels"] == usual["pixels"]
+    assert coarse["fine"]["wrong"] == usual["wrong"]
+    assert coarse["pixels"] < usual["pixels"] / 3
 
 
 def test_the_same_views_give_the_same_figures(walk: Path) -> None:

@@ -1,15 +1,17 @@
 """`farfield verify`: every baked cell of a walk against full renders, as figures and a picture.
 
-Views are 60 degrees wide with as many pixels across as a face has texels, the paper's setting; a
-second set of figures, `fine`, is at twice that. `floor` is what the same figures say of the full
-render against itself half a pixel off: a bake that reaches it is as good as a picture can tell.
+Views are 60 degrees wide with as many pixels across as a face has texels, the paper's setting,
+unless `pixels` says how many. A second set of figures, `fine`, is at twice that; a third,
+`corners`, is of the views from a cell's corners alone. `floor` is what the same figures say of the
+full render against itself half a pixel off: a bake that reaches it is as good as a picture can
+tell.
 """
 
 from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -54,12 +56,14 @@ class Tally:
     floor: list[Figures] = field(default_factory=list)
     fine_walk: list[Figures] = field(default_factory=list)
     fine_floor: list[Figures] = field(default_factory=list)
+    corner_walk: list[Figures] = field(default_factory=list)
+    corner_floor: list[Figures] = field(default_factory=list)
     pops: list[tuple[float, int]] = field(default_factory=list)
 
     def add(self, other: Tally) -> None:
         """Take in another tally."""
-        for name in ("walk", "floor", "fine_walk", "fine_floor", "pops"):
-            getattr(self, name).extend(getattr(other, name))
+        for part in fields(self):
+            getattr(self, part.name).extend(getattr(other, part.name))
 
     def json(self) -> Json:
         """Figures by name; null where no view showed any far field."""
@@ -69,6 +73,7 @@ class Tally:
             **_json(self.walk, pop),
             "floor": _floor(self.floor),
             "fine": {**_json(self.fine_walk, None), "floor": _floor(self.fine_floor)},
+            "corners": {**_json(self.corner_walk, None), "floor": _floor(self.corner_floor)},
         }
 
 
@@ -94,10 +99,11 @@ def shot(picture: Picture) -> Shot:
 class Verifier:
     """Compares a walk in a local store with its scene. Create it in the process that uses it.
 
-    Raises NotFoundError where there is no walk, or its scene is not in the same store.
+    `pixels` across a view are as many as a face has texels unless given. Raises NotFoundError where
+    there is no walk, or its scene is not in the same store.
     """
 
-    def __init__(self, target: Path) -> None:
+    def __init__(self, target: Path, pixels: int | None = None) -> None:
         manifest = find_walk(target)
         self._walks = WalkShooter(manifest)
         self.walk = self._walks.walk
@@ -108,6 +114,7 @@ class Verifier:
                 f"The scene of {manifest} is not beside it; verify the store that the bake wrote."
             )
         self._scenes = SceneShooter(open_scene(prepared))
+        self._pixels = pixels or self.walk.resolution
         self._near_clip = 0.01 * min(self.walk.grid.size)
 
     def close(self) -> None:
@@ -124,17 +131,18 @@ class Verifier:
         for pose in poses(centre, half, shown, views, seed):
             tally = Tally()
             worst = self._view(cell, pose, 1, tally.walk, tally.floor)
+            if pose.kind == "corner":
+                tally.corner_walk.extend(tally.walk)
+                tally.corner_floor.extend(tally.floor)
             self._view(cell, pose, 2, tally.fine_walk, tally.fine_floor)
             yield tally, worst
 
     def _view(
         self, cell: CellFile, pose: Pose, scale: int, walk: list[Figures], floor: list[Figures]
     ) -> ComparedView | None:
-        """Compare one view at `scale` pixels a texel, adding to `walk` and `floor`."""
+        """Compare one view, `scale` times as fine, adding to `walk` and `floor`."""
         x, y, z = (float(c) for c in pose.eye)
-        view = View(
-            (x, y, z), pose.yaw, pose.pitch, FOV, scale * self.walk.resolution, self._near_clip
-        )
+        view = View((x, y, z), pose.yaw, pose.pitch, FOV, scale * self._pixels, self._near_clip)
         near_field = NearField(cell.eyes[0], self.walk.near_field)
         full = shot(self._scenes.shoot(view, near_field))
         moved = shot(self._scenes.shoot(replace(view, jitter=(0.5, 0.5)), near_field))
@@ -156,7 +164,7 @@ class Verifier:
             eye: NDArray[np.float64] = rng.uniform(np.minimum(low, high), np.maximum(low, high))
             x, y, z = (float(c) for c in eye)
             yaw, pitch = look(rng.normal(size=3) * (1, 0.25, 1))
-            view = View((x, y, z), yaw, pitch, FOV, self.walk.resolution, self._near_clip)
+            view = View((x, y, z), yaw, pitch, FOV, self._pixels, self._near_clip)
             first = shot(self._walks.shoot(view, cell.cell))
             second = shot(self._walks.shoot(view, neighbour.cell))
             far = first.far | second.far
@@ -178,13 +186,18 @@ def neighbours(cells: list[CellFile]) -> Iterator[tuple[CellFile, CellFile]]:
 
 
 def verify(
-    target: Path, views: int, progress: Progress | None = None, keep: int = 6
+    target: Path,
+    views: int,
+    progress: Progress | None = None,
+    keep: int = 6,
+    pixels: int | None = None,
 ) -> tuple[Json, list[ComparedView]]:
     """Figures of every baked cell and overall, and the `keep` views with most wrong pixels.
 
-    Raises NotFoundError where there is nothing to verify.
+    `pixels` across a view are as many as a face has texels unless given. Raises
+    NotFoundError where there is nothing to verify.
     """
-    verifier = Verifier(target)
+    verifier = Verifier(target, pixels)
     try:
         cells = verifier.cells()
         if not cells:

@@ -17,10 +17,15 @@ NAMES = ("wrong", "missing", "extra", "flip", "psnr", "pop")
 @click.argument("walk", type=click.Path(path_type=Path))
 @click.option("--views", default=24, type=click.IntRange(1, 10000), help="views of each cell")
 @click.option(
+    "--pixels",
+    type=click.IntRange(16, 4096),
+    help="pixels across a view  [default: as many as a face has texels]",
+)
+@click.option(
     "--sheet", type=click.Path(path_type=Path, dir_okay=False), help="PNG of the worst views"
 )
 @json_option
-def command(walk: Path, views: int, sheet: Path | None, as_json: bool) -> None:
+def command(walk: Path, views: int, pixels: int | None, sheet: Path | None, as_json: bool) -> None:
     """Compare the walk in the folder WALK with full renders of its scene.
 
     Shares are of the pixels that show far field; "floor" is the full render against itself half
@@ -40,7 +45,7 @@ def command(walk: Path, views: int, sheet: Path | None, as_json: bool) -> None:
         progress.one_more()
 
     try:
-        figures, worst = verify(walk, views, advance)
+        figures, worst = verify(walk, views, advance, pixels=pixels)
     finally:
         if progress is not None:
             progress.__exit__()
