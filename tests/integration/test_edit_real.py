@@ -32,7 +32,7 @@ pytestmark = [
 TOWN = SCENES["medieval_town_2M"]
 #: ten by ten cells over market and streets
 CORRIDOR = Corridor(box=Box(min=(-27, 0, -57), max=(73, 10, 43)))
-SETTINGS = BakeSettings(resolution=128, near=42.0)
+SETTINGS = BakeSettings(near=42.0)
 #: share of an eye's view that may show what the visibility eyes missed: as in a bake
 TARGET = 2e-5
 
