@@ -15,7 +15,7 @@ from farfield_core.walk import CellFile
 from farfield_worker.demo.city import write_city
 
 SOAK = os.environ.get("FARFIELD_SOAK") == "1"
-TRIANGLES, RESOLUTION, MEGABYTES = (850_000, 2048, 4096) if SOAK else (20_000, 512, 1024)
+TRIANGLES, RESOLUTION, MEGABYTES = (850_000, 2048, 4096) if SOAK else (50_000, 512, 1024)
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from farfield_core.scene import Triple
+from farfield_core.validation import WHOLE
 from farfield_core.walk import Count, StrictModel, Text
 
 VERSION: Literal[1] = 1
@@ -32,7 +33,7 @@ class ObjectFile(StrictModel):
     """
 
     format: Literal["farfield-object"] = "farfield-object"
-    version: Literal[1] = VERSION
+    version: Annotated[Literal[1], WHOLE] = VERSION
     name: str
     low: Triple
     high: Triple
