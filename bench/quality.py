@@ -4,8 +4,8 @@
 
 SCENE is a name of tests/corridors/scenes.py, the demo city unless given. Two neighbouring cells of
 its corridor are baked with 64 layers (or the near border that so many have), 512 texels and the
-four side faces, and compared by `farfield verify` in 48 views of 512 pixels. `fine_faces` is the
-same with faces of 1024 texels at the same bound, seen at 512 pixels.
+four side faces, in rooms all six, and compared by `farfield verify` in 48 views of 512 pixels.
+`fine_faces` is the same with faces of 1024 texels at the same bound, seen at 512 pixels.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def figures(name: str, quads: str) -> dict[str, Any]:
                 "cell_size": (scene.cell_size,) * 3,
                 "layers": 64,
                 "resolution": PIXELS,
-                "faces": "sides",
+                "faces": scene.faces,
             }
         )
         bound = default_alpha(PIXELS)

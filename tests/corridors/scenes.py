@@ -26,12 +26,14 @@ class Scene:
         source: model file, relative to DATA; None for the demo city.
         cell_size: edge length of cells, in the scene's own units.
         first: the first cell's centre, to the scene's unit.
+        faces: which faces show something: rooms have floors and ceilings.
     """
 
     name: str
     source: str | None
     cell_size: float
     first: tuple[float, float, float]
+    faces: str = "sides"
 
     @property
     def corridor(self) -> Path:
@@ -59,9 +61,9 @@ SCENES = {
         # a clearing on a slope
         Scene("forest_alpha", "forest_alpha/forest_alpha.glb", 6, (-45, 0, 53)),
         # millimetres: across the carpet, towards the bed
-        Scene("hotel_room", "hotel_room/hotel_room.glb", 250, (8985, 1540, -6387)),
+        Scene("hotel_room", "hotel_room/hotel_room.glb", 250, (8985, 1540, -6387), "all"),
         # an eighth of a metre: along the arena's upper floor
-        Scene("pandora", "pandora_indoor/pandora.obj", 16, (276, 270, -7)),
+        Scene("pandora", "pandora_indoor/pandora.obj", 16, (276, 270, -7), "all"),
         # down the avenue to the great temple
         Scene("city", None, 14, (0, 8, 308)),
     )
