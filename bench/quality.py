@@ -18,7 +18,7 @@ from typing import Any
 from farfield.target import prepared_scene
 from farfield_core import layout
 from farfield_core.bake import create_bake
-from farfield_core.corridor import Corridor, parse_corridor, read_corridor
+from farfield_core.corridor import Corridor, read_corridor
 from farfield_core.placement import default_alpha
 from farfield_core.scenes import open_prepared
 from farfield_core.settings import BakeSettings
@@ -66,11 +66,13 @@ def figures(name: str, quads: str) -> dict[str, Any]:
 
 def corridor(scene: Scene) -> Corridor:
     """The first cell of the scene's corridor, and the one east of it."""
-    path = read_corridor(scene.corridor).path
+    whole = read_corridor(scene.corridor)
+    path = whole.path
     assert path is not None
     x, y, z = path.points[0]
-    points = [[x, y, z], [x + 0.8 * scene.cell_size, y, z]]
-    return parse_corridor({"path": {"points": points, "width": 0.01 * scene.cell_size}})
+    points = ((x, y, z), (x + 0.8 * scene.cell_size, y, z))
+    path = path.model_copy(update={"points": points, "width": 0.01 * scene.cell_size})
+    return whole.model_copy(update={"path": path})
 
 
 def look(store: Store, scene_id: str, scene: Scene, settings: BakeSettings) -> dict[str, Any]:

@@ -57,17 +57,17 @@ def _cast(heights: NDArray[np.uint8], origins: Floats, directions: Floats, steps
             first, last = max(first, min(a, b)), min(last, max(a, b))
         if last <= first:
             continue
-        length = np.sqrt((directions[n] ** 2).sum())
-        step = np.sqrt(3.0) / (length * steps)
+        # number by number: arrays of three would be allocated at every step
+        ox, oy, oz = origins[n, 0], origins[n, 1], origins[n, 2]
+        dx, dy, dz = directions[n, 0], directions[n, 1], directions[n, 2]
+        step = np.sqrt(3.0) / (np.sqrt(dx * dx + dy * dy + dz * dz) * steps)
         t = first + 0.5 * step
         while t < last:
-            x, y, z = origins[n] + t * directions[n]
-            if _inside(heights, x, y, z):
+            if _inside(heights, ox + t * dx, oy + t * dy, oz + t * dz):
                 before, after = max(first, t - step), t
                 for _ in range(6):
                     middle = (before + after) / 2
-                    x, y, z = origins[n] + middle * directions[n]
-                    if _inside(heights, x, y, z):
+                    if _inside(heights, ox + middle * dx, oy + middle * dy, oz + middle * dz):
                         after = middle
                     else:
                         before = middle

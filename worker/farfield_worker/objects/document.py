@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import io
-
 import numpy as np
 from farfield_core.object_file import ObjectFile
-from PIL import Image
 
+from farfield_worker.compile.encode import png
 from farfield_worker.objects.error import OutlineError
 from farfield_worker.objects.fields import Fields
 from farfield_worker.objects.mesh import ObjectMesh
@@ -43,6 +41,4 @@ def picture(fields: Fields) -> bytes:
         for layer in (colors, normals):
             opaque = np.full((*layer.shape[:2], 1), 255, np.uint8)
             layers.append(np.concatenate([layer, opaque], axis=2))
-    out = io.BytesIO()
-    Image.fromarray(np.concatenate(layers)).save(out, "PNG", optimize=True)
-    return out.getvalue()
+    return png(np.concatenate(layers))

@@ -104,7 +104,7 @@ def _sample(scene: PreparedScene, number: int, uv: Floats) -> Floats:
     """The nearest texel, linear RGBA (n, 4)."""
     texture = scene.info.textures[number]
     with Image.open(scene.folder / "textures" / texture.file) as image:
-        pixels = np.asarray(image.convert("RGBA")) / 255.0
+        pixels = np.asarray(image.convert("RGBA"))
     cells = []
     for axis, (wrap, size) in enumerate(
         ((texture.wrap_u, texture.width), (texture.wrap_v, texture.height))
@@ -117,5 +117,5 @@ def _sample(scene: PreparedScene, number: int, uv: Floats) -> Floats:
         else:
             t = np.mod(t, 1.0)
         cells.append(np.minimum((t * size).astype(np.int64), size - 1))
-    found = pixels[cells[1], cells[0]]
+    found = pixels[cells[1], cells[0]] / 255.0
     return np.concatenate([to_linear(found[:, :3]), found[:, 3:]], axis=1)
