@@ -12,9 +12,9 @@ Chromium on the machine's own GL:
   as pictures, copies as height fields.
 
 `flip` is the mean against full renders (`farfield shoot`) over four directions; what polygons come
-to in the same browser is the least that it can be. `frame` is the median processor time of a frame, page
-and graphics process, in parts of the polygons', all by turns. With --keep the picture goes into
-docs/pictures too.
+to in the same browser is the least that it can be. `frame` is the median processor time of a frame,
+page and graphics process, in parts of the polygons', all by turns. With --keep the picture goes
+into docs/pictures too.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ TECHNIQUES = {
 SETTLE = """
 const { walk } = objects.hooks;
 objects.stand.look(args[0], args[1]);
-for (let quiet = 0; quiet < 30; ) {
+for (let quiet = 0; quiet < 10; ) {
   objects.stand.draw(performance.now() / 1000);
   await new Promise((done) => setTimeout(done, 10));
   const { waiting, taken } = walk.objects.stats;
