@@ -30,7 +30,16 @@ Size = Annotated[
 class Budget(BaseModel):
     """What a cell may come to at most; what is left out has no limit."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        json_schema_extra={
+            "anyOf": [
+                {"required": [name], "properties": {name: {"type": "number"}}}
+                for name in ("triangles", "megabytes")
+            ]
+        },
+    )
 
     triangles: Annotated[int, Field(ge=1), WHOLE] | None = Field(
         default=None, description="near triangles of a cell"
