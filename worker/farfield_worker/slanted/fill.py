@@ -93,7 +93,7 @@ def _captured(owner: Any, starts: Any, cell: int, sheet: int) -> int:
 
 
 @njit(cache=True)
-def _continues(
+def continues(
     plane: Any,
     starts: Any,
     disparity: Any,
@@ -146,7 +146,7 @@ def _reaches(
     """Whether `sheet` draws texel (x, y): captured there, or its ring over `fragment`."""
     if _captured(owner, starts, y * resolution + x, sheet) >= 0:
         return True
-    f = _continues(planes[sheet], starts, disparity, low2, high2, resolution, x, y)
+    f = continues(planes[sheet], starts, disparity, low2, high2, resolution, x, y)
     return bool(f == fragment)
 
 
@@ -222,7 +222,7 @@ def _fill(
                         for nx in range(max(x - 1, x0), min(x + 2, x1)):
                             ring = ring or own[ny - y0, nx - x0] >= 0
                     if ring:
-                        f = _continues(planes[s], starts, disparity, low2, high2, resolution, x, y)
+                        f = continues(planes[s], starts, disparity, low2, high2, resolution, x, y)
                         if f >= 0 and not _needed(
                             owner,
                             planes,

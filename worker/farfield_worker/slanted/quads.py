@@ -9,6 +9,7 @@ from farfield_core.faces import FACES, texel_centres
 from numba import njit
 from numpy.typing import NDArray
 
+from farfield_worker.slanted.absorb import absorb
 from farfield_worker.slanted.clip import (
     clip_to_range,
     disparity_range,
@@ -95,6 +96,7 @@ def face_quads(
         sheets = _drop(sheets, least)
     low2, high2 = tolerance.interval(disparity, 2.0)
     starts = texel_starts(fragments.texel, resolution)
+    sheets = absorb(sheets, fragments.texel, starts, disparity, low2, high2, resolution)
     texels = fill(sheets, starts, disparity, low2, high2, resolution)
     known = np.ones(len(disparity), np.bool_) if seen is None else seen
     source = shown(sheets, texels, known, resolution)
@@ -199,7 +201,4 @@ def limit_corners(polygon: Floats) -> list[Floats]:
 def _drop(sheets: Sheets, least: int) -> Sheets:
     """Sheets that own at least `least` fragments."""
     size = np.bincount(sheets.owner[sheets.owner >= 0], minlength=len(sheets.rect))
-    keep = size >= least
-    number = np.where(keep, np.cumsum(keep) - 1, -1).astype(np.int32)
-    owner = np.where(sheets.owner >= 0, number[sheets.owner], -1).astype(np.int32)
-    return Sheets(sheets.rect[keep], sheets.plane[keep], owner)
+    return sheets.take(size >= least)

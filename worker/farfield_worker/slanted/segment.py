@@ -78,6 +78,12 @@ class Sheets(NamedTuple):
     plane: Floats
     owner: Ints
 
+    def take(self, keep: NDArray[np.bool_]) -> Sheets:
+        """Only the sheets in `keep` (s,); fragments of the others are captured by none."""
+        # with one more for the owner -1
+        number = np.append(np.where(keep, np.cumsum(keep) - 1, -1), -1).astype(np.int32)
+        return Sheets(self.rect[keep], self.plane[keep], number[self.owner])
+
 
 def segment(
     texel: Ints,
