@@ -6,4 +6,4 @@ Cells of another version are baked again where they could be carried over (reuse
 from __future__ import annotations
 
 #: raised whenever the baker makes other cells of the same scene and settings than before
-VERSION = 3
+VERSION = 4
