@@ -122,6 +122,24 @@ def test_blobs(client: TestClient, walk: Walk) -> None:
     problem(client.get(f"walks/{walk.id}/near/{ATLAS}"), 404)
 
 
+def test_near_blocks_are_packed_once(client: TestClient, walk: Walk) -> None:
+    address = f"walks/{walk.id}/near/{NEAR}"
+    plain = client.get(address, headers={"Accept-Encoding": "identity"})
+    assert "content-encoding" not in plain.headers
+    tags = {plain.headers["etag"]}
+    for accepted, coding in {"gzip, br": "br", "gzip": "gzip"}.items():
+        sent = client.get(address, headers={"Accept-Encoding": accepted})
+        assert (sent.headers["content-encoding"], sent.content) == (coding, plain.content)
+        assert sent.headers["content-type"] == "model/gltf-binary"
+        assert (sent.headers["vary"], sent.headers["cache-control"]) == ("Accept-Encoding", FOREVER)
+        known = {"Accept-Encoding": accepted, "If-None-Match": sent.headers["etag"]}
+        assert client.get(address, headers=known).status_code == 304
+        tags.add(sent.headers["etag"])
+    assert len(tags) == 3
+    lost = address.replace(NEAR, "0" * 32 + ".glb")
+    problem(client.get(lost, headers={"Accept-Encoding": "br"}), 404)
+
+
 def test_blobs_come_in_ranges(client: TestClient, walk: Walk) -> None:
     address = f"walks/{walk.id}/near/{NEAR}"
     part = client.get(address, headers={"Range": "bytes=4-7"})

@@ -37,7 +37,7 @@ def content(request: Request, data: bytes, media_type: str, cache: str = FOREVER
 
 
 def packed(request: Request, name: str, data: bytes, coding: Coding) -> Response:
-    """Answer with JSON in one of its forms, each with an ETag of its own (RFC 9110, 8.8.3.3).
+    """Answer with an object in one of its forms, each with an ETag of its own (RFC 9110, 8.8.3.3).
 
     `name` is the object's key: nothing that has a key ever changes.
     """
@@ -48,7 +48,7 @@ def packed(request: Request, name: str, data: bytes, coding: Coding) -> Response
     # always said, so that nothing compresses it once more
     if coding != "identity":
         headers["Content-Encoding"] = coding
-    return Response(data, 200, headers, "application/json")
+    return Response(data, 200, headers, mimetypes.guess_type(name)[0])
 
 
 def blob(request: Request, store: Store, key: str) -> Response:

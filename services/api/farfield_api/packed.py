@@ -1,7 +1,8 @@
-"""JSON of walks, compressed once: brotli and gzip forms lie beside what they are made from.
+"""JSON and near blocks of walks, compressed once: their forms lie beside what they are made from.
 
     bakes/<bake>/cells/<i>_<j>_<k>.json      the cell, which alone says that it is done
-    bakes/<bake>/cells/<i>_<j>_<k>.json.br   made when first asked for, or by an export
+    bakes/<bake>/cells/<i>_<j>_<k>.json.br   brotli, made when first asked for, or by an export
+    blobs/near/<hash>.glb.gz                 gzip, likewise
 
 A web server in front of a store in a folder can send them itself. Cells are 1 to 3 MB of JSON, so
 compressing them at every request would cost more than all else; what was sent lately is kept.
@@ -58,13 +59,14 @@ def choose(accepted: str) -> Coding:
 def pack(data: bytes, coding: Coding) -> bytes:
     """Compress; the same bytes always give the same bytes."""
     if coding == "br":
-        packed: bytes = brotli.compress(data, mode=brotli.MODE_TEXT, quality=_BROTLI)
+        mode = brotli.MODE_GENERIC if data[:4] == b"glTF" else brotli.MODE_TEXT
+        packed: bytes = brotli.compress(data, mode=mode, quality=_BROTLI)
         return packed
     return gzip.compress(data, _GZIP, mtime=0) if coding == "gzip" else data
 
 
 class PackedObjects:
-    """JSON objects of a store in any form; those sent lately are kept in memory."""
+    """Objects of a store in any form; those sent lately are kept in memory."""
 
     def __init__(self, store: Store) -> None:
         self._store = store

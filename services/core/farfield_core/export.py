@@ -1,10 +1,11 @@
 """A walk as plain files that any static host serves, in a folder or in one zip.
 
     walk.json, pages/, cells/, atlases/, near/      the walk, its places relative to itself
-    *.json.br, *.json.gz                            compressed forms, where asked for
+    *.json.br, *.json.gz, *.glb.br, *.glb.gz        compressed forms, where asked for
 
-In a zip, JSON is deflated and everything else, compressed already, is stored, so that a reader with
-range requests gets a cell in one request; entries have no date, so the same walk is the same zip.
+In a zip, JSON and near blocks are deflated and pictures, compressed already, are stored, so that a
+reader with range requests gets a cell in one request; entries have no date, so the same walk is the
+same zip.
 """
 
 from __future__ import annotations
@@ -24,6 +25,9 @@ from farfield_core.walk import CellFile, Places
 
 PLACES = Places(cells="cells/", atlases="atlases/", near="near/")
 
+#: what is compressed; pictures are already
+_LOOSE = (".json", ".glb")
+
 Progress = Callable[[int, int], None]
 
 
@@ -32,7 +36,7 @@ def export_folder(
 ) -> int:
     """Write a walk into a new folder; returns its bytes.
 
-    `pack` makes compressed forms of JSON by suffix. Raises BadInputError if there is something in
+    `pack` makes compressed forms by suffix. Raises BadInputError if there is something in
     the folder, and NotFoundError for no such bake.
     """
     if folder.exists() and any(folder.iterdir()):
@@ -43,7 +47,7 @@ def export_folder(
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
         total += len(data)
-        if name.endswith(".json"):
+        if name.endswith(_LOOSE):
             for suffix, packed in pack.items():
                 path.with_name(path.name + suffix).write_bytes(packed(data))
     return total
@@ -59,9 +63,9 @@ def export_zip(store: Store, bake: str, target: Path, tell: Progress) -> int:
             for name, data in _files(store, bake, tell):
                 entry = zipfile.ZipInfo(name)
                 entry.external_attr = 0o644 << 16
-                text = name.endswith(".json")
-                entry.compress_type = zipfile.ZIP_DEFLATED if text else zipfile.ZIP_STORED
-                archive.writestr(entry, data, compresslevel=6 if text else None)
+                loose = name.endswith(_LOOSE)
+                entry.compress_type = zipfile.ZIP_DEFLATED if loose else zipfile.ZIP_STORED
+                archive.writestr(entry, data, compresslevel=6 if loose else None)
         part.replace(target)
     finally:
         part.unlink(missing_ok=True)

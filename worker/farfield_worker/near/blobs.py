@@ -15,7 +15,7 @@ from farfield_core.scene import Batch, PreparedScene
 from farfield_core.validation import parse
 from numpy.typing import NDArray
 
-from farfield_worker.near.glb import ARRAY_BUFFER, GlbWriter
+from farfield_worker.near.glb import ARRAY_BUFFER, PACKED, GlbWriter
 from farfield_worker.near.quantise import common_step, quantise
 from farfield_worker.near.textures import near_texture
 
@@ -96,19 +96,18 @@ class NearBlocks:
         triangles = scene.triangles[first : first + block.triangles] - np.uint32(block.first_vertex)
         if block.vertices <= np.iinfo(np.uint16).max:
             triangles = triangles.astype(np.uint16)
-        cuts = [(3 * (part.first_triangle - first), 3 * part.triangles) for part in block.parts]
+        cuts = [(part.first_triangle - first, part.triangles) for part in block.parts]
         primitives = [
             {
                 "attributes": shared | ({"TEXCOORD_0": uv_accessor} if textured[n] else {}),
                 "indices": accessor,
                 "material": n,
             }
-            for n, accessor in enumerate(glb.add_range(triangles.reshape(-1), cuts))
+            for n, accessor in enumerate(glb.add_triangles(triangles, cuts))
         ]
         objects, owners = self._objects(first, first + block.triangles)
         if objects:
-            parts = [(part.first_triangle - first, part.triangles) for part in block.parts]
-            for n, accessor in enumerate(glb.add_range(owners, parts, None)):
+            for n, accessor in enumerate(glb.add_range(owners, cuts)):
                 primitives[n]["extras"] = {"owners": accessor}
         origin = np.asarray(info.origin)
         node = {
@@ -180,13 +179,9 @@ class NearBlocks:
                 "samplers": samplers,
                 "textures": textures,
             }
-        extensions = ["KHR_mesh_quantization"]
-        if any(batch.unlit for batch in batches):
-            extensions.append("KHR_materials_unlit")
-        return root | {
-            "extensionsUsed": extensions,
-            "extensionsRequired": ["KHR_mesh_quantization"],
-        }
+        required = ["KHR_mesh_quantization", PACKED]
+        unlit = ["KHR_materials_unlit"] if any(batch.unlit for batch in batches) else []
+        return root | {"extensionsUsed": required + unlit, "extensionsRequired": required}
 
 
 def pack_uvs(uvs: NDArray[np.float32]) -> tuple[NDArray[Any], bool]:

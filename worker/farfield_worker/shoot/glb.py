@@ -10,6 +10,7 @@ import json
 import struct
 from typing import Any, Literal, NamedTuple, NoReturn
 
+import meshoptimizer
 import numpy as np
 from farfield_core.errors import BadInputError
 from numpy.typing import NDArray
@@ -129,7 +130,7 @@ def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
 def _accessor(gltf: dict[str, Any], binary: bytes, number: int) -> NDArray[Any]:
     """Values of an accessor, (count, width): floats where it is float or normalised."""
     accessor = gltf["accessors"][number]
-    view = gltf["bufferViews"][accessor["bufferView"]]
+    view, binary = _view(gltf, binary, gltf["bufferViews"][accessor["bufferView"]])
     kind, width = np.dtype(_COMPONENTS[accessor["componentType"]]), _WIDTHS[accessor["type"]]
     stride = view.get("byteStride", kind.itemsize * width)
     start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
@@ -139,6 +140,25 @@ def _accessor(gltf: dict[str, Any], binary: bytes, number: int) -> NDArray[Any]:
     if accessor.get("normalized", False):
         return np.maximum(values / np.iinfo(kind).max, -1.0)
     return values
+
+
+def _view(
+    gltf: dict[str, Any], binary: bytes, view: dict[str, Any]
+) -> tuple[dict[str, Any], bytes]:
+    """A buffer view and the bytes that it is a part of; packed triangles are unpacked."""
+    packed = view.get("extensions", {}).get("EXT_meshopt_compression")
+    if packed is None:
+        return view, binary
+    count, stride, start = packed["count"], packed["byteStride"], packed.get("byteOffset", 0)
+    data = binary[start : start + packed["byteLength"]]
+    # a packed triangle takes a byte at least
+    if packed["mode"] != "TRIANGLES" or stride not in (2, 4) or not 0 <= count <= 3 * len(data):
+        _refuse("its buffers are packed in a way that is not known")
+    try:
+        indices = meshoptimizer.decode_index_buffer(count, 4, data)
+    except RuntimeError:
+        _refuse("its triangles are damaged")
+    return {}, indices.astype(f"<u{stride}").tobytes()
 
 
 def _primitive(

@@ -96,4 +96,8 @@ def atlas(request: Request, service: Service, bake: BakeId, name: BlobName) -> R
 @router.get("/near/{name}", response_class=Response)
 def near(request: Request, service: Service, bake: BakeId, name: BlobName) -> Response:
     """Get a near block, or a texture of one."""
-    return immutable.blob(request, service.store, layout.near_key(name))
+    key, coding = layout.near_key(name), _coding(request)
+    # whoever asks for a part counts in the bytes of the file itself
+    if not name.endswith(".glb") or coding == "identity" or "range" in request.headers:
+        return immutable.blob(request, service.store, key)
+    return immutable.packed(request, key, service.packed.get(key, coding), coding)

@@ -31,7 +31,9 @@ from farfield.progress import CellProgress
     metavar="I,J,K",
     help="Write this one cell as a glTF model, as any glTF viewer shows it.",
 )
-@click.option("--packed/--plain", default=True, help="Also write .br and .gz beside JSON.")
+@click.option(
+    "--packed/--plain", default=True, help="Also write .br and .gz beside JSON and near blocks."
+)
 @store_option
 @json_option
 def command(

@@ -1,6 +1,6 @@
 /** The worker's side of `WorkerBuilder`. */
 
-import { answer, type BuildRequest } from './builder.js';
+import { Answerer, type BuildRequest } from './builder.js';
 
 interface WorkerScope {
   onmessage: ((event: MessageEvent<BuildRequest>) => void) | null;
@@ -9,7 +9,9 @@ interface WorkerScope {
 
 const scope = globalThis as unknown as WorkerScope;
 
+const answerer = new Answerer();
+
 scope.onmessage = ({ data }) => {
-  const { reply, transfer } = answer(data);
+  const { reply, transfer } = answerer.answer(data);
   scope.postMessage(reply, transfer);
 };

@@ -3,8 +3,8 @@
 import { FarfieldError, asError, AbortedError } from './errors.js';
 import type { CellFile, NearReference, Vec3 } from './format.js';
 import { WALK_VERSION } from './format.js';
-import { buildNearBatches, type NearBatch, type NearSource } from './near.js';
-import { CopyList, type Copy } from './objects/copies.js';
+import { NearBuild, type NearBatch, type NearSource } from './near.js';
+import type { Copy } from './objects/copies.js';
 import {
   findObjects,
   type FindOptions,
@@ -33,11 +33,20 @@ export interface BuiltNear {
   readonly copies: readonly Copy[];
 }
 
+/** A near field that is being built. It ends with `finish` or `cancel`. */
+export interface NearJob {
+  /** Take one block's triangles; its bytes are not needed any more when this settles. */
+  add(source: NearSource): Promise<void>;
+  finish(): Promise<BuiltNear>;
+  /** Forget what was added; harmless at the end. */
+  cancel(): void;
+}
+
 export interface CellBuilder {
   /** Build a cell from its file's bytes, which may be taken away from the caller. */
   cell(bytes: ArrayBuffer, resolution: number): Promise<BuiltCell>;
-  /** Build the near field of the cell of `size` at `centre`. */
-  near(sources: readonly NearSource[], centre: Vec3, size: Vec3): Promise<BuiltNear>;
+  /** Start the near field of the cell of `size` at `centre`. */
+  near(centre: Vec3, size: Vec3): NearJob;
   /** Find the objects of a near field; the caller keeps its arrays. */
   objects(batches: readonly Triangles[], options: FindOptions): Promise<FoundObjects>;
   dispose(): void;
@@ -65,10 +74,9 @@ export function buildCell(bytes: ArrayBuffer, resolution: number): BuiltCell {
   };
 }
 
-function buildNear(sources: readonly NearSource[], centre: Vec3, size: Vec3): BuiltNear {
-  const list = new CopyList();
-  const batches = buildNearBatches(sources, centre, list);
-  return { batches, solid: buildSolid(batches, centre, size), copies: list.copies };
+function finishNear(build: NearBuild, centre: Vec3, size: Vec3): BuiltNear {
+  const batches = build.finish();
+  return { batches, solid: buildSolid(batches, centre, size), copies: build.copies };
 }
 
 /** Builds on the calling thread. */
@@ -77,8 +85,14 @@ export class InlineBuilder implements CellBuilder {
     return Promise.resolve(buildCell(bytes, resolution));
   }
 
-  async near(sources: readonly NearSource[], centre: Vec3, size: Vec3): Promise<BuiltNear> {
-    return Promise.resolve(buildNear(sources, centre, size));
+  near(centre: Vec3, size: Vec3): NearJob {
+    const build = new NearBuild(centre);
+    return {
+      // eslint-disable-next-line @typescript-eslint/require-await -- what is thrown must reject
+      add: async (source) => build.add(source),
+      finish: () => Promise.resolve(finishNear(build, centre, size)),
+      cancel: () => undefined,
+    };
   }
 
   async objects(batches: readonly Triangles[], options: FindOptions): Promise<FoundObjects> {
@@ -92,11 +106,14 @@ export class InlineBuilder implements CellBuilder {
 
 export type BuildRequest =
   | { id: number; kind: 'cell'; bytes: ArrayBuffer; resolution: number }
-  | { id: number; kind: 'near'; sources: readonly NearSource[]; centre: Vec3; size: Vec3 }
+  | { id: number; kind: 'near-add'; near: number; source: NearSource; centre: Vec3 }
+  | { id: number; kind: 'near-finish'; near: number; centre: Vec3; size: Vec3 }
+  | { id: number; kind: 'near-cancel'; near: number }
   | { id: number; kind: 'objects'; batches: readonly Triangles[]; options: FindOptions };
 
 export type BuildReply =
-  { id: number; value: BuiltCell | BuiltNear | FoundObjects } | { id: number; error: string };
+  | { id: number; value: BuiltCell | BuiltNear | FoundObjects | undefined }
+  | { id: number; error: string };
 
 interface Waiting {
   readonly resolve: (value: never) => void;
@@ -127,8 +144,24 @@ export class WorkerBuilder implements CellBuilder {
     return this.ask({ id: this.next++, kind: 'cell', bytes, resolution }, [bytes]);
   }
 
-  near(sources: readonly NearSource[], centre: Vec3, size: Vec3): Promise<BuiltNear> {
-    return this.ask({ id: this.next++, kind: 'near', sources, centre, size }, []);
+  near(centre: Vec3, size: Vec3): NearJob {
+    const near = this.next++;
+    let open = false;
+    return {
+      add: async (source) => {
+        open = true;
+        await this.ask<undefined>({ id: this.next++, kind: 'near-add', near, source, centre }, []);
+      },
+      finish: () => {
+        open = false;
+        return this.ask({ id: this.next++, kind: 'near-finish', near, centre, size }, []);
+      },
+      cancel: () => {
+        const id = this.next++;
+        if (open) this.ask<undefined>({ id, kind: 'near-cancel', near }, []).catch(() => undefined);
+        open = false;
+      },
+    };
   }
 
   objects(batches: readonly Triangles[], options: FindOptions): Promise<FoundObjects> {
@@ -140,7 +173,7 @@ export class WorkerBuilder implements CellBuilder {
     this.fail(new AbortedError());
   }
 
-  private ask<T extends BuiltCell | BuiltNear | FoundObjects>(
+  private ask<T extends BuiltCell | BuiltNear | FoundObjects | undefined>(
     request: BuildRequest,
     transfer: Transferable[],
   ): Promise<T> {
@@ -156,38 +189,74 @@ export class WorkerBuilder implements CellBuilder {
   }
 }
 
-/** Answer one request; the buffers in the reply can be transferred. */
-export function answer(request: BuildRequest): { reply: BuildReply; transfer: ArrayBuffer[] } {
-  try {
-    if (request.kind === 'cell') {
-      const value = buildCell(request.bytes, request.resolution);
-      const { far, sectors } = value;
-      const { indices, starts, boxes } = sectors;
-      const arrays = [far.positions, far.texels, indices, starts, boxes];
-      return { reply: { id: request.id, value }, transfer: arrays.map(({ buffer }) => buffer) };
-    }
-    if (request.kind === 'objects') {
-      const value = findObjects(request.batches, request.options);
-      return {
-        reply: { id: request.id, value },
-        transfer: value.batches.map(({ indices }) => indices.buffer),
-      };
-    }
-    const value = buildNear(request.sources, request.centre, request.size);
-    const { corners, starts, items } = value.solid;
-    const transfer = value.batches.flatMap((batch) => [
-      batch.positions.buffer,
-      batch.normals.buffer,
-      batch.uvs.buffer,
-      batch.colors.buffer,
-      batch.indices.buffer,
-      batch.owners.buffer,
-    ]);
-    transfer.push(corners.buffer, starts.buffer, items.buffer);
-    return { reply: { id: request.id, value }, transfer };
-  } catch (error) {
-    return { reply: { id: request.id, error: asError(error).message }, transfer: [] };
+/** The worker's side: answers requests, and holds the near fields that are being built. */
+export class Answerer {
+  private readonly builds = new Map<number, NearBuild>();
+
+  /** Near fields under way. */
+  get building(): number {
+    return this.builds.size;
   }
+
+  /** Answer one request; the buffers in the reply can be transferred. */
+  answer(request: BuildRequest): { reply: BuildReply; transfer: ArrayBuffer[] } {
+    const { id } = request;
+    try {
+      const { value, transfer } = this.make(request);
+      return { reply: { id, value }, transfer };
+    } catch (error) {
+      return { reply: { id, error: asError(error).message }, transfer: [] };
+    }
+  }
+
+  private make(request: BuildRequest): {
+    value: BuiltCell | BuiltNear | FoundObjects | undefined;
+    transfer: ArrayBuffer[];
+  } {
+    switch (request.kind) {
+      case 'cell': {
+        const value = buildCell(request.bytes, request.resolution);
+        const { far, sectors } = value;
+        const { indices, starts, boxes } = sectors;
+        const arrays = [far.positions, far.texels, indices, starts, boxes];
+        return { value, transfer: arrays.map(({ buffer }) => buffer) };
+      }
+      case 'objects': {
+        const value = findObjects(request.batches, request.options);
+        return { value, transfer: value.batches.map(({ indices }) => indices.buffer) };
+      }
+      case 'near-add':
+        this.near(request.near, request.centre).add(request.source);
+        return { value: undefined, transfer: [] };
+      case 'near-cancel':
+        this.builds.delete(request.near);
+        return { value: undefined, transfer: [] };
+      case 'near-finish': {
+        const build = this.near(request.near, request.centre);
+        this.builds.delete(request.near);
+        const value = finishNear(build, request.centre, request.size);
+        return { value, transfer: buffers(value) };
+      }
+    }
+  }
+
+  private near(number: number, centre: Vec3): NearBuild {
+    const build = this.builds.get(number) ?? new NearBuild(centre);
+    this.builds.set(number, build);
+    return build;
+  }
+}
+
+function buffers({ batches, solid }: BuiltNear): ArrayBuffer[] {
+  const ofBatches = batches.flatMap((batch) => [
+    batch.positions.buffer,
+    batch.normals.buffer,
+    batch.uvs.buffer,
+    batch.colors.buffer,
+    batch.indices.buffer,
+    batch.owners.buffer,
+  ]);
+  return [...ofBatches, solid.corners.buffer, solid.starts.buffer, solid.items.buffer];
 }
 
 /** A builder in a worker where there are workers, otherwise on this thread. */

@@ -5,6 +5,7 @@
  */
 
 import { FarfieldError } from './errors.js';
+import { unpackTriangles } from './packed-triangles.js';
 
 export interface GltfTextureInfo {
   readonly index: number;
@@ -44,6 +45,16 @@ export interface GltfPrimitive {
   readonly extras?: { readonly owners?: number };
 }
 
+/** What a buffer view is unpacked from. */
+export interface PackedView {
+  readonly buffer: number;
+  readonly byteOffset?: number;
+  readonly byteLength: number;
+  readonly byteStride: number;
+  readonly count: number;
+  readonly mode: string;
+}
+
 export interface Gltf {
   readonly accessors?: readonly {
     readonly bufferView?: number;
@@ -58,6 +69,7 @@ export interface Gltf {
     readonly byteOffset?: number;
     readonly byteLength: number;
     readonly byteStride?: number;
+    readonly extensions?: { readonly EXT_meshopt_compression?: PackedView };
   }[];
   readonly extras?: {
     readonly objects?: {
@@ -89,6 +101,8 @@ export interface Gltf {
 export interface Glb {
   readonly json: Gltf;
   readonly bin: Uint8Array;
+  /** Packed buffer views that were read. */
+  readonly unpacked: Map<number, Uint32Array>;
 }
 
 type Components = Int8Array | Uint8Array | Int16Array | Uint16Array | Uint32Array | Float32Array;
@@ -112,6 +126,7 @@ const READABLE = new Set([
   'KHR_materials_unlit',
   'KHR_texture_transform',
   'KHR_materials_emissive_strength',
+  'EXT_meshopt_compression',
 ]);
 const WIDTHS: Readonly<Record<string, number | undefined>> = {
   SCALAR: 1,
@@ -145,7 +160,7 @@ export function parseGlb(bytes: ArrayBuffer): Glb {
       throw new FarfieldError('format', `A near block needs the glTF extension ${name}.`);
     }
   }
-  return { json, bin };
+  return { json, bin, unpacked: new Map() };
 }
 
 /** The values of accessor `index`, in place where alignment allows. */
@@ -160,6 +175,17 @@ export function readAccessor(glb: Glb, index: number): AccessorView {
     throw new FarfieldError('format', `A near block has no buffer view ${accessor.bufferView}.`);
   }
   const { bytes, make, scale } = componentType(accessor.componentType);
+  const packed = view.extensions?.EXT_meshopt_compression;
+  if (packed !== undefined) {
+    const all = unpack(glb, accessor.bufferView, packed);
+    const first = (accessor.byteOffset ?? 0) / packed.byteStride;
+    const fits = components === 1 && packed.byteStride === bytes && Number.isInteger(first);
+    if (!fits || first + accessor.count > all.length) {
+      throw new FarfieldError('format', `Accessor ${index} of a near block reaches past its data.`);
+    }
+    const data = all.subarray(first, first + accessor.count);
+    return { data, stride: 1, components, count: accessor.count, scale: 1 };
+  }
   const strideBytes = view.byteStride ?? bytes * components;
   const start = (view.byteOffset ?? 0) + (accessor.byteOffset ?? 0);
   const length = accessor.count === 0 ? 0 : (accessor.count - 1) * strideBytes + bytes * components;
@@ -178,6 +204,22 @@ export function readAccessor(glb: Glb, index: number): AccessorView {
     count: accessor.count,
     scale: accessor.normalized === true ? scale : 1,
   };
+}
+
+function unpack(glb: Glb, number: number, view: PackedView): Uint32Array {
+  const known = glb.unpacked.get(number);
+  if (known !== undefined) return known;
+  if (view.mode !== 'TRIANGLES' || view.buffer !== 0) {
+    throw new FarfieldError('format', 'A near block is packed in a way this viewer cannot read.');
+  }
+  const start = view.byteOffset ?? 0;
+  const packed = glb.bin.subarray(start, start + view.byteLength);
+  if (packed.length < view.byteLength) {
+    throw new FarfieldError('format', 'A near block is cut short.');
+  }
+  const all = unpackTriangles(packed, view.count);
+  glb.unpacked.set(number, all);
+  return all;
 }
 
 function componentType(code: number): {

@@ -8,7 +8,7 @@
 
 import { FarfieldError } from './errors.js';
 import type { Vec3 } from './format.js';
-import { CopyList } from './objects/copies.js';
+import { CopyList, type Copy } from './objects/copies.js';
 import { parseGlb, readAccessor, type AccessorView, type Glb } from './glb.js';
 import { readMaterial, stateKey, type NearMaterial, type NearState } from './near-material.js';
 
@@ -37,17 +37,6 @@ export interface NearSource {
   readonly ranges: readonly number[];
 }
 
-interface Piece {
-  readonly primitive: Primitive;
-  readonly material: NearMaterial;
-  /** For each new vertex, its number in the primitive. */
-  readonly vertices: Uint32Array;
-  /** Corners, as numbers of new vertices. */
-  readonly corners: Uint32Array;
-  /** Number of each triangle's copy, -1 for none. */
-  readonly owners: Int32Array;
-}
-
 interface Primitive {
   readonly position: AccessorView;
   readonly normal: AccessorView | undefined;
@@ -60,19 +49,26 @@ interface Primitive {
 }
 
 /**
- * Merge the listed triangles of `sources`, relative to `centre`; batches, and triangles in them, in
- * the order in which they are best drawn. Copies of objects among them are added to `list`. Throws
- * FarfieldError 'format'.
+ * Merges the listed triangles of near blocks, which come one at a time: of each only what is listed is
+ * kept, so a near field of any number of blocks needs memory for what it draws and one block.
  */
-export function buildNearBatches(
-  sources: readonly NearSource[],
-  centre: Vec3,
-  list = new CopyList(),
-): NearBatch[] {
-  const groups = new Map<string, Piece[]>();
-  for (const { bytes, ranges } of sources) {
+export class NearBuild {
+  /** What the batches' owners are numbers of. */
+  readonly copies: readonly Copy[];
+  private readonly centre: Vec3;
+  private readonly list = new CopyList();
+  private readonly groups = new Map<string, NearBatch[]>();
+
+  /** @param centre what positions are relative to */
+  constructor(centre: Vec3) {
+    this.centre = centre;
+    this.copies = this.list.copies;
+  }
+
+  /** Take the listed triangles of a block; throws FarfieldError 'format'. */
+  add({ bytes, ranges }: NearSource): void {
     const glb = parseGlb(bytes);
-    const copies = list.add(glb);
+    const copies = this.list.add(glb);
     const perPrimitive = new Map<number, [number, number][]>();
     for (let n = 0; n + 2 < ranges.length; n += 3) {
       const wanted = perPrimitive.get(ranges[n]) ?? [];
@@ -82,14 +78,24 @@ export function buildNearBatches(
     for (const [number, wanted] of perPrimitive) {
       const { primitive, material } = readPrimitive(glb, number);
       const key = stateKey(material.state);
-      const pieces = groups.get(key) ?? [];
-      pieces.push({ primitive, material, ...collect(primitive, wanted, copies) });
-      groups.set(key, pieces);
+      const pieces = this.groups.get(key) ?? [];
+      pieces.push(cutOut(primitive, material, wanted, copies, this.centre));
+      this.groups.set(key, pieces);
     }
   }
-  const owned = list.copies.length > 0;
-  const batches = [...groups.values()].map((pieces) => merge(pieces, centre, owned));
-  return batches.sort((a, b) => middle(a) - middle(b));
+
+  /**
+   * Batches, and triangles in them, in the order in which they are best drawn, the same for the same
+   * blocks in the same order. Nothing can be added after that.
+   */
+  finish(): NearBatch[] {
+    const batches: NearBatch[] = [];
+    for (const [key, pieces] of this.groups) {
+      batches.push(merge(pieces, this.copies.length > 0));
+      this.groups.delete(key);
+    }
+    return batches.sort((a, b) => middle(a) - middle(b));
+  }
 }
 
 function readPrimitive(glb: Glb, number: number): { primitive: Primitive; material: NearMaterial } {
@@ -121,12 +127,15 @@ function readPrimitive(glb: Glb, number: number): { primitive: Primitive; materi
   };
 }
 
-/** The vertices that some ranges of triangles use, each once, and the triangles over them. */
-function collect(
-  { position, indices, owners }: Primitive,
+/** Some ranges of a primitive's triangles with the vertices that they use, each once, and all owners. */
+function cutOut(
+  primitive: Primitive,
+  material: NearMaterial,
   ranges: readonly [number, number][],
   copies: readonly number[],
-): Pick<Piece, 'vertices' | 'corners' | 'owners'> {
+  centre: Vec3,
+): NearBatch {
+  const { position, indices, owners } = primitive;
   const total = ranges.reduce((sum, [, triangles]) => sum + triangles, 0);
   const available = (indices?.count ?? position.count) / 3;
   const corners = new Uint32Array(3 * total);
@@ -160,33 +169,48 @@ function collect(
       corners[at++] = renumbered[vertex];
     }
   }
-  return { vertices: Uint32Array.from(vertices), corners, owners: whose };
+  const batch = emptyBatch(material.state, vertices.length, total, total);
+  copyVertices(batch, primitive, material, vertices, centre);
+  batch.indices.set(corners);
+  batch.owners.set(whose);
+  return batch;
 }
 
-function merge(pieces: readonly Piece[], centre: Vec3, owned: boolean): NearBatch {
-  const { state } = pieces[0].material;
+function emptyBatch(
+  state: NearState,
+  vertices: number,
+  triangles: number,
+  owners: number,
+): NearBatch {
   const textured = state.map !== undefined || state.emissiveMap !== undefined;
-  const count = pieces.reduce((sum, piece) => sum + piece.vertices.length, 0);
-  const corners = pieces.reduce((sum, piece) => sum + piece.corners.length, 0);
-  const batch: NearBatch = {
+  return {
     state,
-    positions: new Float32Array(3 * count),
-    normals: new Int8Array(4 * count),
-    uvs: new Float32Array(textured ? 2 * count : 0),
-    colors: new Uint16Array(4 * count),
-    indices: new Uint32Array(corners),
-    owners: new Int32Array(owned ? corners / 3 : 0),
+    positions: new Float32Array(3 * vertices),
+    normals: new Int8Array(4 * vertices),
+    uvs: new Float32Array(textured ? 2 * vertices : 0),
+    colors: new Uint16Array(4 * vertices),
+    indices: new Uint32Array(3 * triangles),
+    owners: new Int32Array(owners),
   };
-  let firstVertex = 0;
-  let firstCorner = 0;
+}
+
+function merge(pieces: readonly NearBatch[], owned: boolean): NearBatch {
+  const vertices = pieces.reduce((sum, { positions }) => sum + positions.length / 3, 0);
+  const triangles = pieces.reduce((sum, { indices }) => sum + indices.length / 3, 0);
+  const batch = emptyBatch(pieces[0].state, vertices, triangles, owned ? triangles : 0);
+  let vertex = 0;
+  let corner = 0;
   for (const piece of pieces) {
-    copyVertices(batch, piece, firstVertex, centre);
-    for (let n = 0; n < piece.corners.length; n++) {
-      batch.indices[firstCorner + n] = firstVertex + piece.corners[n];
+    batch.positions.set(piece.positions, 3 * vertex);
+    batch.normals.set(piece.normals, 4 * vertex);
+    batch.uvs.set(piece.uvs, piece.uvs.length > 0 ? 2 * vertex : 0);
+    batch.colors.set(piece.colors, 4 * vertex);
+    for (let n = 0; n < piece.indices.length; n++) {
+      batch.indices[corner + n] = vertex + piece.indices[n];
     }
-    if (owned) batch.owners.set(piece.owners, firstCorner / 3);
-    firstVertex += piece.vertices.length;
-    firstCorner += piece.corners.length;
+    if (owned) batch.owners.set(piece.owners, corner / 3);
+    vertex += piece.positions.length / 3;
+    corner += piece.indices.length;
   }
   sortByDistance(batch);
   return batch;
@@ -228,26 +252,29 @@ function middle({ positions, indices }: NearBatch): number {
   return positions[v] ** 2 + positions[v + 1] ** 2 + positions[v + 2] ** 2;
 }
 
-function copyVertices(batch: NearBatch, piece: Piece, first: number, centre: Vec3): void {
-  const { primitive, material, vertices } = piece;
-  const { position, normal, uv, color, translation, scale } = primitive;
+function copyVertices(
+  batch: NearBatch,
+  { position, normal, uv, color, translation, scale }: Primitive,
+  material: NearMaterial,
+  vertices: readonly number[],
+  centre: Vec3,
+): void {
   const [m00, m01, m02, m10, m11, m12] = material.uvTransform;
   for (let n = 0; n < vertices.length; n++) {
     const source = vertices[n];
-    const target = first + n;
     for (let axis = 0; axis < 3; axis++) {
       const stored = position.data[source * position.stride + axis] * position.scale;
-      batch.positions[3 * target + axis] = translation[axis] - centre[axis] + scale[axis] * stored;
+      batch.positions[3 * n + axis] = translation[axis] - centre[axis] + scale[axis] * stored;
       if (normal !== undefined) {
         const value = normal.data[source * normal.stride + axis] * normal.scale;
-        batch.normals[4 * target + axis] = Math.round(127 * value);
+        batch.normals[4 * n + axis] = Math.round(127 * value);
       }
     }
     if (uv !== undefined && batch.uvs.length > 0) {
       const s = uv.data[source * uv.stride] * uv.scale;
       const t = uv.data[source * uv.stride + 1] * uv.scale;
-      batch.uvs[2 * target] = m00 * s + m01 * t + m02;
-      batch.uvs[2 * target + 1] = m10 * s + m11 * t + m12;
+      batch.uvs[2 * n] = m00 * s + m01 * t + m02;
+      batch.uvs[2 * n + 1] = m10 * s + m11 * t + m12;
     }
     for (let c = 0; c < 4; c++) {
       const stored =
@@ -255,7 +282,7 @@ function copyVertices(batch: NearBatch, piece: Piece, first: number, centre: Vec
           ? 1
           : color.data[source * color.stride + c] * color.scale;
       const value = Math.min(1, stored * material.factor[c]);
-      batch.colors[4 * target + c] = Math.round(65535 * value);
+      batch.colors[4 * n + c] = Math.round(65535 * value);
     }
   }
 }

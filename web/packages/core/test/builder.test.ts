@@ -1,10 +1,14 @@
 import { describe, expect, test } from 'vitest';
+import { makeGlb } from './glb-maker.js';
 import {
+  Answerer,
   InlineBuilder,
   WorkerBuilder,
-  answer,
   buildCell,
   type BuildRequest,
+  type BuiltNear,
+  type CellBuilder,
+  type NearSource,
 } from '../src/index.js';
 
 const CELL = {
@@ -37,10 +41,11 @@ class FakeWorker {
   onmessage: ((event: { data: unknown }) => void) | null = null;
   onerror: ((event: object) => void) | null = null;
   terminated = false;
+  readonly answerer = new Answerer();
 
   postMessage(message: BuildRequest, transfer: ArrayBuffer[]): void {
     const request = structuredClone(message, { transfer });
-    const { reply, transfer: back } = answer(request);
+    const { reply, transfer: back } = this.answerer.answer(request);
     const data = structuredClone(reply, { transfer: back });
     queueMicrotask(() => this.onmessage?.({ data }));
   }
@@ -48,6 +53,21 @@ class FakeWorker {
   terminate(): void {
     this.terminated = true;
   }
+}
+
+/** A block of one triangle at some x. */
+function triangle(x: number): ArrayBuffer {
+  const positions = new Float32Array([x, 0, 0, x, 1, 0, x, 0, 1]);
+  return makeGlb(
+    { nodes: [{ mesh: 0 }], meshes: [{ primitives: [{ attributes: { POSITION: 0 } }] }] },
+    [{ data: positions, componentType: 5126, type: 'VEC3', count: 3 }],
+  );
+}
+
+async function nearField(builder: CellBuilder, sources: readonly NearSource[]): Promise<BuiltNear> {
+  const near = builder.near([0, 0, 0], [10, 4, 10]);
+  for (const source of sources) await near.add(source);
+  return near.finish();
 }
 
 describe('builders', () => {
@@ -66,7 +86,38 @@ describe('builders', () => {
     const remote = await builder.cell(bytes, 64);
     expect(bytes.byteLength).toBe(0);
     expect(remote).toEqual(await new InlineBuilder().cell(encode(CELL), 64));
-    expect((await builder.near([], [0, 0, 0], [10, 4, 10])).batches).toEqual([]);
+  });
+
+  test('near fields are built side by side, the same there as here', async () => {
+    const sources = [1, 2, 3].map((x) => ({ bytes: triangle(x), ranges: [0, 0, 1] }));
+    const worker = new FakeWorker();
+    const remote = new WorkerBuilder(worker as unknown as Worker);
+    const here = new InlineBuilder();
+    const [a, b] = await Promise.all([
+      nearField(remote, sources),
+      nearField(remote, sources.slice(1)),
+    ]);
+    expect(a).toEqual(await nearField(here, sources));
+    expect(b).toEqual(await nearField(here, sources.slice(1)));
+    expect(a.batches[0].indices).toHaveLength(9);
+    expect((await remote.near([0, 0, 0], [10, 4, 10]).finish()).batches).toEqual([]);
+    // The blocks stay the caller's.
+    expect(sources.every(({ bytes }) => bytes.byteLength > 0)).toBe(true);
+  });
+
+  test('a near field that is called off, or of a bad block, leaves nothing behind', async () => {
+    const worker = new FakeWorker();
+    const builder = new WorkerBuilder(worker as unknown as Worker);
+    const near = builder.near([0, 0, 0], [10, 4, 10]);
+    await near.add({ bytes: triangle(1), ranges: [0, 0, 1] });
+    await expect(near.add({ bytes: triangle(1), ranges: [0, 0, 2] })).rejects.toThrow('not have');
+    expect(worker.answerer.building).toBe(1);
+    near.cancel();
+    near.cancel();
+    await nearField(builder, []);
+    expect(worker.answerer.building).toBe(0);
+    const inline = new InlineBuilder().near([0, 0, 0], [10, 4, 10]);
+    await expect(inline.add({ bytes: new ArrayBuffer(4), ranges: [] })).rejects.toThrow('glTF');
   });
 
   test.each([

@@ -1,6 +1,12 @@
 import fc from 'fast-check';
 import { describe, expect, test } from 'vitest';
-import { FarfieldError, buildNearBatches, textureKey, type NearSource } from '../src/index.js';
+import {
+  FarfieldError,
+  NearBuild,
+  textureKey,
+  type NearBatch,
+  type NearSource,
+} from '../src/index.js';
 import { makeGlb } from './glb-maker.js';
 
 const VERTICES = 6;
@@ -45,10 +51,14 @@ function block(materials: object[], root: object = {}): ArrayBuffer {
 }
 
 const TEXTURED = { pbrMetallicRoughness: { baseColorTexture: { index: 0 } } };
-const build = (sources: NearSource[], centre: [number, number, number] = [0, 0, 0]) =>
-  buildNearBatches(sources, centre);
 
-describe('buildNearBatches', () => {
+function build(sources: NearSource[], centre: [number, number, number] = [0, 0, 0]): NearBatch[] {
+  const near = new NearBuild(centre);
+  for (const source of sources) near.add(source);
+  return near.finish();
+}
+
+describe('NearBuild', () => {
   test('draws exactly the listed triangles, where they are, the nearest first', () => {
     fc.assert(
       fc.property(
@@ -100,6 +110,20 @@ describe('buildNearBatches', () => {
     expect(batches.map(({ state }) => state.map?.uri)).toEqual([undefined, 'wood.png', undefined]);
     expect(batches.map(({ uvs }) => uvs.length > 0)).toEqual([false, true, false]);
     expect(Math.max(...batches[1].indices)).toBe(batches[1].positions.length / 3 - 1);
+  });
+
+  test('needs nothing of a block after it was added', () => {
+    const sources = [0, 1].map(() => ({
+      bytes: block([{}, TEXTURED]),
+      ranges: [0, 0, 1, 1, 1, 2],
+    }));
+    const near = new NearBuild([0, 0, 0]);
+    for (const { bytes, ranges } of sources) {
+      const lent = bytes.slice(0);
+      near.add({ bytes: lent, ranges });
+      new Uint8Array(lent).fill(255);
+    }
+    expect(near.finish()).toEqual(build(sources));
   });
 
   test('reads every state', () => {

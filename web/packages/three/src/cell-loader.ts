@@ -5,6 +5,7 @@ import {
   SharedStore,
   Solid,
   type BuiltCell,
+  type BuiltNear,
   type CellBuilder,
   type Copy,
   type FetchQueue,
@@ -28,6 +29,8 @@ import type { PagePool } from './page-pool.js';
 
 /** Bytes of downloaded near blocks that are kept for the next cell. */
 const BLOCK_BYTES = 48 * 2 ** 20;
+/** Near blocks of a cell that are fetched and held at once; more than a queue's requests at once. */
+const AHEAD = 8;
 
 export interface CellLoaderParts {
   readonly manifest: Manifest;
@@ -144,15 +147,7 @@ export class CellLoader {
   }
 
   private async near(cell: BuiltCell, job: Job, user: User, held: (() => void)[]): Promise<Near> {
-    const { builder, manifest } = this.parts;
-    const sources = await settleAll(
-      cell.near.map(async ({ blob, ranges }) => {
-        held.push(() => this.blocks.release(blob, user));
-        return { bytes: await abortable(this.blocks.acquire(blob, user), job.signal), ranges };
-      }),
-    );
-    const built = await builder.near(sources, cell.centre, manifest.walk.grid.size);
-    for (const { blob } of cell.near) this.blocks.release(blob, user);
+    const built = await this.blocksOf(cell, job, user, held);
     job.signal.throwIfAborted();
     const batches = built.batches.map((batch) => ({ ...batch, state: this.absolute(batch.state) }));
     const wanted = batches
@@ -171,6 +166,40 @@ export class CellLoader {
       textures: new Map(textures),
       copies: await this.copies(batches, built.copies, cell.centre, job, user, held),
     };
+  }
+
+  /**
+   * Build the near field block after block, in the file's order. Only a few blocks are held at once:
+   * a near field may be larger than all that is kept of blocks.
+   */
+  private async blocksOf(
+    { near, centre }: BuiltCell,
+    job: Job,
+    user: User,
+    held: (() => void)[],
+  ): Promise<BuiltNear> {
+    const build = this.parts.builder.near(centre, this.parts.manifest.walk.grid.size);
+    const ahead: Promise<ArrayBuffer>[] = [];
+    const fetch = (blob: string): void => {
+      held.push(() => this.blocks.release(blob, user));
+      const bytes = abortable(this.blocks.acquire(blob, user), job.signal);
+      bytes.catch(() => undefined);
+      ahead.push(bytes);
+    };
+    let next = 0;
+    try {
+      for (const { blob, ranges } of near) {
+        while (next < near.length && ahead.length < AHEAD) fetch(near[next++].blob);
+        const [first] = ahead.splice(0, 1);
+        await build.add({ bytes: await first, ranges });
+        this.blocks.release(blob, user);
+        job.signal.throwIfAborted();
+      }
+      return await build.finish();
+    } catch (error) {
+      build.cancel();
+      throw error;
+    }
   }
 
   private async copies(

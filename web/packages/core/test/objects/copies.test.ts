@@ -1,8 +1,7 @@
 import fc from 'fast-check';
 import { describe, expect, test } from 'vitest';
 import {
-  CopyList,
-  buildNearBatches,
+  NearBuild,
   placePoint,
   sortByCopy,
   switchDistance,
@@ -130,20 +129,15 @@ const OBJECTS = { shapes: ['tree'], shape: [0], places: [1, 2, 3, 1], turns: [0,
 describe('copies in near blocks', () => {
   test('a copy with triangles in two blocks is one', () => {
     const other = { ...OBJECTS, shape: [0, 0], places: [9, 9, 9, 1, ...OBJECTS.places] };
-    const list = new CopyList();
-    const batches = buildNearBatches(
-      [
-        { bytes: block(0, { objects: OBJECTS }), ranges: [0, 0, 2] },
-        {
-          bytes: block(5, { objects: { ...other, turns: [0, 0, 0, 1, 0, 0, 0, 1] } }, [1, 2]),
-          ranges: [0, 1, 1],
-        },
-        { bytes: block(7, {}, [0, 0]), ranges: [0, 0, 2] },
-      ],
-      [0, 0, 0],
-      list,
-    );
-    expect(list.copies.map(({ place }) => place)).toEqual([
+    const near = new NearBuild([0, 0, 0]);
+    near.add({ bytes: block(0, { objects: OBJECTS }), ranges: [0, 0, 2] });
+    near.add({
+      bytes: block(5, { objects: { ...other, turns: [0, 0, 0, 1, 0, 0, 0, 1] } }, [1, 2]),
+      ranges: [0, 1, 1],
+    });
+    near.add({ bytes: block(7, {}, [0, 0]), ranges: [0, 0, 2] });
+    const batches = near.finish();
+    expect(near.copies.map(({ place }) => place)).toEqual([
       [1, 2, 3, 1],
       [9, 9, 9, 1],
     ]);
@@ -168,9 +162,8 @@ describe('copies in near blocks', () => {
       block(0, { objects: OBJECTS }, [0]),
     ];
     for (const bytes of bad) {
-      expect(() => buildNearBatches([{ bytes, ranges: [0, 0, 2] }], [0, 0, 0])).toThrow(
-        /near block/,
-      );
+      const near = new NearBuild([0, 0, 0]);
+      expect(() => near.add({ bytes, ranges: [0, 0, 2] })).toThrow(/near block/);
     }
   });
 });
