@@ -5,7 +5,9 @@
 
 The second is the paper's figures 8 and 9 (bench/walk_path.py). Headless Chromium on the machine's
 own GL, one `readPixels` fence a frame. Frames that are compared are drawn in turn in one page
-(`growth`: in two pages), the best of three from each place; ratios are medians. The full model is
+(`growth`: in two pages), the best of three from each place; ratios are medians. `growth` is the walk
+of a model twelve times as large : the smaller one's, both baked with the same budget, and with the
+same near border. The full model is
 drawn by three.js with the walk's own light, its triangles merged per material in 16, 64 or 256
 chunks that the frustum culls; the fastest of these counts. Figures named `processor` count the
 processor time of the page and of the graphics process instead of the clock: on a busy machine
@@ -49,6 +51,7 @@ class Sizes(NamedTuple):
     rounds: int
     options: tuple[str, ...]
     slanted: tuple[str, ...]
+    budget: tuple[str, ...]
     cap_megabytes: int
 
 
@@ -56,12 +59,14 @@ FULL = Sizes(
     *(850_000, 10_000_000, 4, 6, (18, 8), 1000, 3),
     ("--resolution", "512"),
     ("--quads", "slanted", "--near", "14.8"),
+    ("--quads", "slanted", "--budget", "triangles=4000"),
     64,
 )
 QUICK = Sizes(
     *(60_000, 120_000, 1, 3, (3, 3), 60, 1),
     ("--resolution", "128", "--layers", "16"),
     ("--quads", "slanted", "--near", "30"),
+    ("--quads", "slanted", "--budget", "triangles=4000"),
     24,
 )
 
@@ -260,7 +265,14 @@ def figures(sizes: Sizes) -> dict[str, Any]:
             write_city(larger, triangles=sizes.grown)
             grown = bake(larger, avenue(1), folder / "grown", *sizes.options, *sizes.slanted)
             with served(folder / "grown") as other:
-                out |= growth(browser, [(address, tour), (other, grown)], sizes)
+                found = growth(browser, [(address, tour), (other, grown)], sizes)
+                out |= {f"{key}_same_near": value for key, value in found.items()}
+        small, large = (
+            bake(scene, avenue(1), folder / f"{scene.stem}_budget", *sizes.options, *sizes.budget)
+            for scene in (model, larger)
+        )
+        with served(folder / "city_budget") as one, served(folder / "larger_budget") as other:
+            out |= growth(browser, [(one, small), (other, large)], sizes)
         around = bake(
             model,
             {"path": {"points": loop(*sizes.loop), "width": 0.1 * CELL, "height": CELL}},
