@@ -5,9 +5,9 @@
 
 The second is the paper's figures 8 and 9 (bench/walk_path.py). Headless Chromium on the machine's
 own GL, one `readPixels` fence a frame. Frames that are compared are drawn in turn in one page
-(`growth`: in two pages), the best of three from each place; ratios are medians. `growth` is the walk
-of a model twelve times as large : the smaller one's, both baked with the same budget, and with the
-same near border. The full model is
+(`growth`: in two pages), the best of three from each place; ratios are medians. `growth` is the
+walk of a model twelve times as large : the smaller one's, both baked with the same budget, and with
+the same near border. The full model is
 drawn by three.js with the walk's own light, its triangles merged per material in 16, 64 or 256
 chunks that the frustum culls; the fastest of these counts. Figures named `processor` count the
 processor time of the page and of the graphics process instead of the clock: on a busy machine
