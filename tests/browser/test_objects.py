@@ -101,7 +101,8 @@ def test_walking_on_never_strays_from_the_objects(example: Example, server: Walk
 
 
 def test_one_target_change_and_few_pictures_a_frame(example: Example, server: WalkServer) -> None:
-    example.show(server, MANY + "&perFrame=3&fade=0")
+    # with time enough that a slow machine takes no fewer
+    example.show(server, MANY + "&perFrame=3&milliseconds=1000&fade=0")
     frames = example.call(
         """
         const gl = objects.stand.renderer.getContext();

@@ -34,6 +34,7 @@ export function showMany(stand: Stand, query: URLSearchParams): Show {
     renderer,
     atlas: Number(query.get('atlas') ?? 2048),
     perFrame: Number(query.get('perFrame') ?? 8),
+    milliseconds: Number(query.get('milliseconds') ?? 4),
     fade: Number(query.get('fade') ?? 0.25),
   });
   scene.add(impostors.group);
